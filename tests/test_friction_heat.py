@@ -5,7 +5,7 @@ import re
 import pytest
 
 from karamelo_py.points.laws.linear import LinearConstants
-from karamelo_py.styles.methods.ulmpm_contacts import heat_shares
+from karamelo_py.styles.methods.ulmpm_contacts import heat_fractions
 
 pytestmark = pytest.mark.xdist_group("friction heat")
 MU, G, V, TIME = 0.4, 10.0, 2.0, 0.2
@@ -71,7 +71,7 @@ def test_heat_is_shared_by_effusivity():
     """sqrt(kappa rho cp) of steel and glass, 4 : 1 here; all to the one that has a temperature."""
     steel, glass = (LinearConstants(1000, 1e6, 0.3, 500, kappa).checked() for kappa in (16, 1))
     cold = LinearConstants(1000, 1e6, 0.3).checked()
-    shares = heat_shares([steel, glass, cold], conducting=True)
+    shares = heat_fractions([steel, glass, cold], conducting=True)
     assert shares[0] == pytest.approx([0.5, 0.8, 1])
     assert shares[2] == pytest.approx([0, 0, 0.5])
-    assert heat_shares([steel, glass], conducting=False)[0, 1] == 0.5
+    assert heat_fractions([steel, glass], conducting=False)[0, 1] == 0.5

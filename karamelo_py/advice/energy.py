@@ -49,7 +49,7 @@ def cause_of_gain(hub: Hub, simulation: Simulation) -> tuple[str, str]:
         return (
             f"time step is {simulation.dt / stable:.3g} x the stability limit{alone} in the "
             f"undeformed state ({stable:.4g})",
-            f"set_dt({stable_step.DEFAULT_SHARE * stable:.3g}) or less, or remove set_dt",
+            f"set_dt({stable_step.DEFAULT_FRACTION * stable:.3g}) or less, or remove set_dt",
         )
     if moves and jumps and update.transfer.traits.inverts_spread:
         return f"{transfer} with {basis} in the updated frame", f"FLIP, or {smooth}"
@@ -58,7 +58,7 @@ def cause_of_gain(hub: Hub, simulation: Simulation) -> tuple[str, str]:
         return f"{transfer} with {basis} in a body that moves through the grid", smooth
     if update.anti_locking and moves:
         return "F-bar in the updated frame", "remove anti_volumetric_locking"
-    if conserving < stable_step.DEFAULT_SHARE and fraction > conserving * (1 + 1e-9):
+    if conserving < stable_step.DEFAULT_FRACTION and fraction > conserving * (1 + 1e-9):
         points = " with one point per cell" if stable_step.sparse(hub) else ""
         return (
             f"points crossing cells: {transfer} and {scheme} with {basis}{points} at "

@@ -49,8 +49,8 @@ THIN = 0.2  # thickness / smallest width of a plate in plane stress
 def lesser_models(hub: Hub, _: object = None) -> Words:
     held = rollers(hub)
     for rule in (_flat, _bar, _thin):
-        if found := list(rule(hub, held)):
-            yield from found
+        if suggestions := list(rule(hub, held)):
+            yield from suggestions
             break
     yield from round_bodies(hub, held)
     yield from _mirrored(hub)

@@ -41,10 +41,10 @@ def extent(solids: Sequence[Solid]) -> tuple[np.ndarray, np.ndarray]:
 
 def rollers(hub: Hub) -> dict[int, Roller]:
     """Return the symmetry planes by direction, without directions that have planes at both ends."""
-    found: dict[int, Roller] = {}
+    planes: dict[int, Roller] = {}
     solids = [solid for solid in hub.solids.values() if solid.count]
     if not solids:
-        return found
+        return planes
     lo, hi = extent(solids)
     small, twice = hub.domain.tolerance, set()
     for fix in hub.fixes.values():
@@ -59,9 +59,9 @@ def rollers(hub: Hub) -> dict[int, Roller]:
             beyond = (side * (x - end) < small).all()
             filled = np.count_nonzero(np.abs(x - end) < small) == whole
             if is_zero(fix.formulas[k]) and beyond and filled:
-                twice |= {k} & found.keys()
-                found[k] = Roller(float(end) + 0.0, side, fix)
-    return {k: roller for k, roller in found.items() if k not in twice}
+                twice |= {k} & planes.keys()
+                planes[k] = Roller(float(end) + 0.0, side, fix)
+    return {k: roller for k, roller in planes.items() if k not in twice}
 
 
 def acting(hub: Hub) -> list[Fix]:

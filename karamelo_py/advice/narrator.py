@@ -9,9 +9,9 @@ from karamelo_py.advice.step_size import (
     own_step_instead,
     own_step_instead_of,
     stable_step,
+    words_of_fraction,
     words_of_limit,
     words_of_own_step,
-    words_of_share,
 )
 from karamelo_py.kernels.step import DONE
 from karamelo_py.kernels.watch import WITHIN
@@ -102,7 +102,7 @@ class Narrator(Listener):
             facts["own_dt"] = dt = own_step_instead_of(simulation)
             shown["own dt"] = words_of_own_step(simulation, dt) if dt else None
             facts["limited_by"] = simulation.ruling_limit
-            shown["limited by"] = f"{words_of_limit(simulation)}; {words_of_share(simulation)}"
+            shown["limited by"] = f"{words_of_limit(simulation)}; {words_of_fraction(simulation)}"
         if why and simulation.moves:
             facts["energy_unwatched"], shown["energy"] = why, f"is {energy.not_watched(why)}"
         hub.record.begin(facts)

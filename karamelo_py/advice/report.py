@@ -9,9 +9,9 @@ from karamelo_py.advice.step_size import (
     own_step_instead_of,
     stable_step,
     step_after_motion,
+    words_of_fraction,
     words_of_limit,
     words_of_own_step,
-    words_of_share,
     words_of_solution,
 )
 from karamelo_py.advice.suggestions import seconds_of_step, suggestions
@@ -71,7 +71,7 @@ def report(hub: Hub, end_time: float = inf) -> None:
     else:
         stable = stable_step(simulation, simulation.steps.limit)
         say(f"first dt       {simulation.dt:.6g} (stable limit {stable:.6g})")
-        say(f"               {words_of_share(simulation)}")
+        say(f"               {words_of_fraction(simulation)}")
         if (step := own_step_instead_of(simulation)) is not None:
             say(f"own dt         {words_of_own_step(simulation, step)}")
         say(f"limited by     {words_of_limit(simulation)}")

@@ -81,9 +81,9 @@ def round_bodies(hub: Hub, held: dict[int, Roller]) -> Words:
                 yield _sphere(hub, solids, middle)
                 return
             continue
-        found = list(_cylinder(hub, solids, middle, others, squares))
-        yield from found
-        if found:
+        suggestions = list(_cylinder(hub, solids, middle, others, squares))
+        yield from suggestions
+        if suggestions:
             return
 
 
@@ -118,7 +118,7 @@ def _is_round(region: Region | None, here: Callable, middle: Middle, reach: floa
     rng = np.random.default_rng(1)
     r = 1.01 * reach * rng.random(SAMPLES)
     at = middle.lo + (middle.hi - middle.lo) * rng.random((SAMPLES, 3))
-    found = []
+    masks = []
     for _ in range(2):
         way = rng.normal(size=(SAMPLES, len(middle.across)))
         sides = middle.sides[middle.across]
@@ -127,8 +127,8 @@ def _is_round(region: Region | None, here: Callable, middle: Middle, reach: floa
         x[:, middle.across] = middle.centre[middle.across] + (
             r[:, None] * way / np.linalg.norm(way, axis=1, keepdims=True)
         )
-        found.append(region.inside(x) & (here(x) | (r > reach)))
-    return bool((found[0] == found[1]).all())
+        masks.append(region.inside(x) & (here(x) | (r > reach)))
+    return bool((masks[0] == masks[1]).all())
 
 
 def _places_of(hub: Hub, fix: Fix) -> np.ndarray:

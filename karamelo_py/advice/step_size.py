@@ -16,7 +16,7 @@ from karamelo_py.run.stable_step import (
 )
 from karamelo_py.scene.modify import Fix
 from karamelo_py.schemes.semi_implicit import SemiImplicit
-from karamelo_py.schemes.traits import DEFAULT_SHARE
+from karamelo_py.schemes.traits import DEFAULT_FRACTION
 
 LOST = 2.05  # step / stable step above which every run failed
 EXPLAINED = {"light_nodes": " (nodes with little mass)", "lone_points": " (points alone in cells)"}
@@ -30,7 +30,7 @@ def own_step(simulation: Simulation, *, still: bool = False) -> float:
     weight = own_weight_of_drift(simulation.hub)
     rate = motion.rate if weight == motion.weight else steps.rate_with(weight)
     limit = courant * spacing / rate if rate > 0 else inf
-    step = min(fraction * limit, DEFAULT_SHARE * control.heat[0].heat_limit)
+    step = min(fraction * limit, DEFAULT_FRACTION * control.heat[0].heat_limit)
     speed = simulation.fastest() if weight != 1 else 0.0
     return float(min(step, STRIDE * spacing / speed) if speed > 0 else step)
 
@@ -78,7 +78,7 @@ def step_after_motion(simulation: Simulation) -> float:
 
 
 def stable_step(simulation: Simulation, limit: float) -> float:
-    return max(limit, own_step(simulation) / DEFAULT_SHARE)
+    return max(limit, own_step(simulation) / DEFAULT_FRACTION)
 
 
 def own_step_instead(simulation: Simulation, command: str = "") -> str:
@@ -103,7 +103,7 @@ def words_of_limit(simulation: Simulation) -> str:
     return limit + words
 
 
-def words_of_share(simulation: Simulation) -> str:
+def words_of_fraction(simulation: Simulation) -> str:
     hub, steps = simulation.hub, simulation.steps
     asked, conserving = hub.update.dt_factor, conserving_fraction(hub)
     if hub.update.fixed_dt is not None:
@@ -112,7 +112,7 @@ def words_of_share(simulation: Simulation) -> str:
     elif asked is None:
         step = simulation.control.step[0]
         of_heat = simulation.ruling_limit == "conduction"
-        words = f"{DEFAULT_SHARE if of_heat else float(step.dt_factor):g} of the stable step, "
+        words = f"{DEFAULT_FRACTION if of_heat else float(step.dt_factor):g} of the stable step, "
         words += "the program's own"
         after = step_after_motion(simulation)
         far = f"; {after:.2g} of that once points have moved a quarter of a cell"
@@ -121,7 +121,7 @@ def words_of_share(simulation: Simulation) -> str:
         fraction = asked
         words = f"{fraction:g} of the stable step, by dt_factor"
     # `large_steps` warns of a fraction above 1.
-    if max(conserving, 1e-9) * (1 + 1e-9) < fraction <= 1 and conserving < DEFAULT_SHARE:
+    if max(conserving, 1e-9) * (1 + 1e-9) < fraction <= 1 and conserving < DEFAULT_FRACTION:
         return words + f": above {conserving:g} a body that drifts gains energy"
     return words
 
@@ -136,7 +136,7 @@ def words_of_solution(simulation: Simulation, duration: float) -> str:
     refused = any(map(_is_refused, hub.fixes.values())) or any(unsupported(hub, ""))
     if not (fits and alone and explicit) or refused:
         return ""
-    courant = DEFAULT_SHARE * courant_of(hub, SemiImplicit)[sparse(hub)]
+    courant = DEFAULT_FRACTION * courant_of(hub, SemiImplicit)[sparse(hub)]
     dt = courant * float(simulation.control.step[0].spacing) / fastest_wave(simulation)
     return f"with scheme(semi-implicit), limited by the dry soil, about {duration / dt:.0f} steps"
 

@@ -76,11 +76,11 @@ def _owner(material: Material, kind: str, numbers: tuple[Argument, ...]) -> Mate
     able = [part for part in viscous if names <= _names(part)]
     if kind == "viscosity":
         if not able:
-            known = sorted({name for part in viscous for name in _names(part)} - {"material"})
+            constants = sorted({name for part in viscous for name in _names(part)} - {"material"})
             message = f"material '{material.id}' has no viscosity"
             if viscous:
                 message = f"{message} with {' and '.join(sorted(names))}"
-            expected = ", ".join(f"{name}=..." for name in known) or "viscosity(STYLE, ID, ...)"
+            expected = ", ".join(f"{name}=..." for name in constants) or "viscosity(STYLE, ID, ...)"
             raise ScriptError(message, mark=numbers[0].mark, expected=expected)
         return able[0]
     whole = next(part for part in material.parts() if part.kind == "material")

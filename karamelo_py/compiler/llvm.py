@@ -31,14 +31,14 @@ class Lanes(LaneType):
 
 def per_type(function: Callable) -> Callable:
     """Cache results by Numba's type numbers, as hashing types is slow."""
-    known: dict[int, Any] = {}
+    results: dict[int, Any] = {}
 
-    def found(kind: types.Type) -> Any:
-        if kind._code not in known:
-            known[kind._code] = function(kind)
-        return known[kind._code]
+    def cached(kind: types.Type) -> Any:
+        if kind._code not in results:
+            results[kind._code] = function(kind)
+        return results[kind._code]
 
-    return found
+    return cached
 
 
 @per_type

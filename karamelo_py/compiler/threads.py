@@ -368,12 +368,12 @@ def shared_out(function: Callable) -> Callable:
     return loop
 
 
-def by_threads(share: Callable) -> Callable:
+def by_threads(body: Callable) -> Callable:
     """Make the kernel ``f(mode, count, ...)``: ``share(..., k)`` for k in [0, count)."""
-    names = ["mode", "count", *inspect.signature(share).parameters][:-1]
-    loop = shared_out(share)
+    names = ["mode", "count", *inspect.signature(body).parameters][:-1]
+    loop = shared_out(body)
 
-    @functools.wraps(share, updated=())  # retains marks of the function
+    @functools.wraps(body, updated=())  # retains marks of the function
     def all_shares(*arguments):
         loop(*arguments)
 

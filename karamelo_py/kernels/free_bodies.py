@@ -151,8 +151,8 @@ def _list_point(body, surface, s, block, p):
             contact.v[c] += weight * s.nodes.update[n, c]
     contact.gap, contact.mass, contact.mu = -within - ball, points.mass[p], surface.mu
     deep = max((within + ball) / (DEEP * h), 1.0)
-    share = SOFT * dt * times.kick / (times.contact_dt * times.contact_kick)
-    contact.share = min(deep * deep * share, 1.0)
+    fraction = SOFT * dt * times.kick / (times.contact_dt * times.contact_kick)
+    contact.share = min(deep * deep * fraction, 1.0)
     contact.most, contact.face = 0.0, face(kin, volume, x)
     contact.number = number
     for c in range(3):
@@ -328,7 +328,7 @@ def _reaction(body, s):
 
 @noinline
 def _add_links(body, s):
-    impulses, centre, values = body.solution.given, body.state[0].x, s.control.values
+    impulses, centre, values = body.solution.link_impulses, body.state[0].x, s.control.values
     kick, force, torque = s.control.step[0].kick, s.contact.slot, s.contact.torque
     for k in range(3):
         turning = impulses[3 + k] + motion.cross(centre, impulses, k)

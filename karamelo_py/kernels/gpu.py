@@ -3,7 +3,7 @@
 A cell consists of the points with the same nodes, and has the number of the first node. Before each
 scatter, points are sorted by cell, then by id. A thread per cell sums over points, then a thread
 per node sums over cells. No two threads add to the same number, so results are reproducible and
-independent of the order in memory. `fate` (5,) contains errors and extremes.
+independent of the order in memory. `outcome` (5,) contains errors and extremes.
 """
 
 import functools
@@ -31,7 +31,7 @@ from karamelo_py.points.basis.cpdi import of_corner
 from karamelo_py.points.basis.product import digits, node_number
 from karamelo_py.points.grid import inside
 
-MOVED, RATE, WRONG, STATUS, DRIFT = range(5)  # in `fate`; STATUS: 0, or 1 + a status of steps
+MOVED, RATE, WRONG, STATUS, DRIFT = range(5)  # in `outcome`; STATUS: 0, or 1 + a status of steps
 BEHIND = 2.0**53  # above all point ids
 CHUNK = 64  # items summed per thread
 WARP = 32  # threads that read memory together
@@ -79,25 +79,25 @@ def nodes_in_cell(basis: Any, kin: Any) -> int:
 
 @functools.cache  # a single stage for all launches
 def while_steps_go_on(function: Callable) -> Callable:
-    def go_on(i, fate, *arguments):
-        if fate[STATUS] == 0:
-            function(i, fate, *arguments)
+    def go_on(i, outcome, *arguments):
+        if outcome[STATUS] == 0:
+            function(i, outcome, *arguments)
 
     for name in ("__name__", "__qualname__", "__module__"):
         setattr(go_on, name, getattr(function, name))
     return go_on
 
 
-def goes_wrong(fate, number):
-    raise_to(fate, WRONG, BEHIND - float(number))
+def goes_wrong(outcome, number):
+    raise_to(outcome, WRONG, BEHIND - float(number))
 
 
-def _report(fate, number, moved, rate, stride):
+def _report(outcome, number, moved, rate, stride):
     if sweep.is_good(stride, moved, rate):
-        raise_to(fate, MOVED, float(moved))
-        raise_to(fate, RATE, float(rate))
+        raise_to(outcome, MOVED, float(moved))
+        raise_to(outcome, RATE, float(rate))
     else:
-        goes_wrong(fate, number)
+        goes_wrong(outcome, number)
 
 
 def is_last(s):
@@ -155,20 +155,20 @@ class Stage:
         def load_of_point(s, block, i):
             return flat(load_all(quantities, point(s, block, index(i))[1]))
 
-        def load_point(i, fate, s, block, cells):
+        def load_point(i, outcome, s, block, cells):
             keep(point(s, block, index(i))[1], cells)
 
-        def gather_point(i, fate, s, block, cells):
+        def gather_point(i, outcome, s, block, cells):
             c, pt = point(s, block, index(i))
             pt = pt._replace(stencil=sweep.stencil_of(pt.w, pt.p))
             x = sweep.position_of(pt.w, pt.p)
             totals = gathered_by(OneByOne(), tasks, pt.w, pt.stencil, x)
             # Start from zero, as a running maximum would depend on the order of threads.
             moved, rate = updated_all(tasks, pt, totals, real(0, c.dt))
-            _report(fate, block.points.id[pt.p], moved, rate, c.stride)
+            _report(outcome, block.points.id[pt.p], moved, rate, c.stride)
             keep(pt, cells)
 
-        def count_point(i, fate, s, block, cells):
+        def count_point(i, outcome, s, block, cells):
             points = block.points
             c, pt = point(s, block, index(i))
             where = location_of(pt)
@@ -181,7 +181,7 @@ class Stage:
                 cells.number[index(k * points.mass.size + i)] = number
                 counted(cells.count, number, 1)
             if not is_inside:
-                goes_wrong(fate, points.id[pt.p])
+                goes_wrong(outcome, points.id[pt.p])
 
         self._point, self._location = point, location_of
         self.load, self.load_point = load_of_point, load_point
@@ -202,7 +202,7 @@ class Stage:
             sums, velocity = room_of("sums", rooms, nodes.sums), nodes.velocity
             return Nodes(sums, nodes.update, room_of("velocity", rooms, velocity), tuple(fields))
 
-        def scatter_cell(i, fate, s, block, cells):
+        def scatter_cell(i, outcome, s, block, cells):
             if i >= cells.box[cells.box.size - 1] or (only_if_more and is_last(s)):
                 return
             cell = cells.cell[i]
@@ -246,7 +246,7 @@ class Stage:
         columns, only_if_more, at = self.columns, self.row.only_if_more, self.at
         begin, end = self.nodes_of(section)
 
-        def sum_node(i, fate, s, cells, use):
+        def sum_node(i, outcome, s, cells, use):
             if use[i] == 0 or (only_if_more and is_last(s)):
                 return
             grid = _grid_of(s.grids, i)
@@ -267,7 +267,7 @@ class Stage:
         """Return the function that lowers a node's mark: 2 in use, 1 to be cleared, 0 unused."""
         only_if_more = self.row.only_if_more
 
-        def age_node(i, fate, s, use):
+        def age_node(i, outcome, s, use):
             if use[i] > 0 and not (only_if_more and is_last(s)):
                 use[i] -= 1
 
@@ -276,7 +276,7 @@ class Stage:
     def mark(self) -> Callable:
         count, only_if_more = self.support, self.row.only_if_more
 
-        def mark_nodes(i, fate, s, cells, use):
+        def mark_nodes(i, outcome, s, cells, use):
             if i >= cells.box[cells.box.size - 1] or (only_if_more and is_last(s)):
                 return
             cell = cells.cell[i]
@@ -312,14 +312,14 @@ def _weight(number):
     return int(number) + (OCCUPIED if number > 0 else 0)
 
 
-def sum_counts(i, fate, cells):
+def sum_counts(i, outcome, cells):
     total = 0
     for c in range(i * CHUNK, min((i + 1) * CHUNK, cells.count.size)):
         total += _weight(cells.count[c])
     cells.sums[i] = total
 
 
-def sum_sums(i, fate, cells, level):
+def sum_sums(i, outcome, cells, level):
     """Sum the `i`-th chunk of a level into the next level (prefix sums by chunks).
 
     `level`: index of its first sum, number of sums, index of the first sum of the next level.
@@ -331,7 +331,7 @@ def sum_sums(i, fate, cells, level):
     cells.sums[above + i] = total
 
 
-def sum_before(i, fate, cells, begin, above):
+def sum_before(i, outcome, cells, begin, above):
     """Sum the items before item `i` of a level; `above` is the start of the next level, or -1."""
     chunk = i // CHUNK
     total = cells.before[above + chunk] if above >= 0 else 0
@@ -340,7 +340,7 @@ def sum_before(i, fate, cells, begin, above):
     cells.before[begin + i] = total
 
 
-def place_list(i, fate, cells):
+def place_list(i, outcome, cells):
     chunk = i // CHUNK
     total = cells.before[chunk]
     for c in range(chunk * CHUNK, i):
@@ -355,7 +355,7 @@ def place_list(i, fate, cells):
         cells.box[i + 1] = box + (1 if count > 0 else 0)
 
 
-def list_point(i, fate, cells):
+def list_point(i, outcome, cells):
     c = cells.number[i]
     cells.order[cells.first[c] + counted(cells.count, c, -1) - 1] = i
 
@@ -369,7 +369,7 @@ def sort_cell(corners: int) -> Callable:
         p, corner = _point_and_corner(corners, ids.size, listed)
         return ids[p] * corners + corner
 
-    def sort_cell(i, fate, ids, cells):
+    def sort_cell(i, outcome, ids, cells):
         if i >= cells.box[cells.box.size - 1]:
             return
         c = cells.cell[i]
@@ -390,7 +390,7 @@ def sort_cell(corners: int) -> Callable:
 # memory, then the second points, and so on.
 
 
-def order_cell(i, fate, cells, come_from):
+def order_cell(i, outcome, cells, come_from):
     boxes = cells.box[cells.box.size - 1]
     if i >= boxes:
         return
@@ -410,13 +410,13 @@ def order_cell(i, fate, cells, come_from):
         cells.order[first + q] = at
 
 
-def take_rows(i, fate, rows, come_from, room):
+def take_rows(i, outcome, rows, come_from, room):
     p = index(come_from[i])
     for k in range(rows.shape[0]):
         room[k, i] = rows[k, p]
 
 
-def put_rows(i, fate, rows, room):
+def put_rows(i, outcome, rows, room):
     for k in range(rows.shape[0]):
         rows[k, i] = room[k, i]
 
@@ -425,7 +425,7 @@ def of_nodes(row: Any) -> Callable:
     task, at, length = row.task, row.at or (lambda s: s), row.length or kick
     made = row.make or (lambda s: task)
 
-    def visit_node(i, fate, s, use):
+    def visit_node(i, outcome, s, use):
         if use[i] > 0:
             here = at(s)
             at_node(made(s), here.kin, here.nodes, index(i), length(s))
@@ -433,35 +433,35 @@ def of_nodes(row: Any) -> Callable:
     return visit_node
 
 
-def clear(i, fate, array, first):
+def clear(i, outcome, array, first):
     array[first + i] = 0
 
 
 def take_reports(take: Callable) -> Callable:
 
-    def take_all_reports(i, fate, s):
+    def take_all_reports(i, outcome, s):
         motion = s.control.motion[0]
-        motion.new_move, motion.new_rate = fate[MOVED], fate[RATE]
+        motion.new_move, motion.new_rate = outcome[MOVED], outcome[RATE]
         take(s.control)
-        fate[MOVED] = 0.0
-        fate[RATE] = 0.0
-        if fate[WRONG] > 0:
+        outcome[MOVED] = 0.0
+        outcome[RATE] = 0.0
+        if outcome[WRONG] > 0:
             motion.wrong = 1
-            fate[STATUS] = 1.0 + STOPPED
+            outcome[STATUS] = 1.0 + STOPPED
 
     return take_all_reports
 
 
-def finish_step(i, fate, s):
-    fate[DRIFT] += s.control.motion[0].move
+def finish_step(i, outcome, s):
+    outcome[DRIFT] += s.control.motion[0].move
     finish(s.control)
 
 
-def end_step(i, fate, s):
+def end_step(i, outcome, s):
     step = s.control.step[0]
     if step.watch_limit > 0 and step.over_limit >= MOST_ABOVE_LIMIT:
-        fate[STATUS] = 1.0 + ABOVE_LIMIT
+        outcome[STATUS] = 1.0 + ABOVE_LIMIT
     elif step.limit < SMALLEST * step.first_limit:
-        fate[STATUS] = 1.0 + SHRUNK
+        outcome[STATUS] = 1.0 + SHRUNK
     elif s.control.values[TIME] >= step.end_time:
-        fate[STATUS] = 1.0 + DONE
+        outcome[STATUS] = 1.0 + DONE

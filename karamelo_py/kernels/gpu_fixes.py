@@ -56,7 +56,7 @@ def _control(count: int) -> Callable:
 _CONTROL = _control(0)
 
 
-def clear_held(i, fate, holders):
+def clear_held(i, outcome, holders):
     for c in range(holders.shape[1]):
         holders[i, c].slot = 0
 
@@ -73,7 +73,7 @@ def _member(hooks, h, i):
     return i if begin < 0 else hooks.members[begin + i]
 
 
-def count_node(i, fate, s, about):
+def count_node(i, outcome, s, about):
     if s.nodes.sums[_member(about.hooks, about.h, i), arrays.MASS] > 0:
         counted(about.heavy, about.h, 1)
 
@@ -86,7 +86,7 @@ def whole_nodes(target: int, stage: int) -> Callable:
     return lambda s, tag: hook_loop.whole_nodes(s, tag, stage, target)
 
 
-def work_of_loads(i, fate, s, about, target):
+def work_of_loads(i, outcome, s, about, target):
     if s.nodes.sums[i, arrays.MASS] > 0:
         hooks = _hooks_with_room(about.hooks)
         hooks.chosen[0] = i
@@ -98,7 +98,7 @@ def on_node(nodes_of: Callable, task: int, values: int = 0, length: Callable = k
     """Return the thread function of a hook's `task` at a node, for the time that `length` gives."""
     control_of = _control(values)
 
-    def visit_member(i, fate, s, about, *tag):
+    def visit_member(i, outcome, s, about, *tag):
         hooks = about.hooks
         n = _member(hooks, about.h, i)
         if s.nodes.sums[n, arrays.MASS] > 0:
@@ -113,7 +113,7 @@ def on_node(nodes_of: Callable, task: int, values: int = 0, length: Callable = k
     return visit_member
 
 
-def clear_force(i, fate, s, block):
+def clear_force(i, outcome, s, block):
     force = field(block.points.fields, Force)
     if force is not None:
         for c in range(force.shape[0]):
@@ -129,7 +129,7 @@ def whole_points(heats: bool) -> Callable:
 def on_point(points_of: Callable, then: int, values: int = 0) -> Callable:
     control_of = _control(values)
 
-    def visit_point(i, fate, s, block, about, *tag):
+    def visit_point(i, outcome, s, block, about, *tag):
         hooks, control = _hooks_with_room(about.hooks), control_of(s, about.copies, i)
         members = points_of(s, block, then, *tag)
         call = hook_loop.Call(hooks, control, float(step_size(s)), about.h, 1.0)
@@ -140,19 +140,19 @@ def on_point(points_of: Callable, then: int, values: int = 0) -> Callable:
     return visit_point
 
 
-def check_point(i, fate, s, block):
+def check_point(i, outcome, s, block):
     points = block.points
     cells, good = checked_move(move_check(s), points, i)
     if good:
-        raise_to(fate, MOVED, cells)
+        raise_to(outcome, MOVED, cells)
     else:
-        goes_wrong(fate, points.id[i])
+        goes_wrong(outcome, points.id[i])
 
 
-def take_moves(i, fate, s):
+def take_moves(i, outcome, s):
     motion = s.control.motion[0]
-    motion.move = max(motion.move, fate[MOVED])
-    fate[MOVED] = 0.0
+    motion.move = max(motion.move, outcome[MOVED])
+    outcome[MOVED] = 0.0
 
 
 def _setup(s: arrays.Setup) -> Callable:
@@ -175,7 +175,7 @@ def _setup(s: arrays.Setup) -> Callable:
 def each_node(function: Callable, s: arrays.Setup) -> Callable:
     setup_of = _setup(s)
 
-    def visit_each_node(i, fate, s, use, copies):
+    def visit_each_node(i, outcome, s, use, copies):
         if use[i] > 0:
             function(setup_of(s, copies, i), i)
 
@@ -185,30 +185,30 @@ def each_node(function: Callable, s: arrays.Setup) -> Callable:
 def each_point(function: Callable, s: arrays.Setup) -> Callable:
     setup_of = _setup(s)
 
-    def visit_each_point(i, fate, s, block, copies):
+    def visit_each_point(i, outcome, s, block, copies):
         function(setup_of(s, copies, i), block, i)
 
     return visit_each_point
 
 
 def once(function: Callable) -> Callable:
-    def do_once(i, fate, s):
+    def do_once(i, outcome, s):
         function(s)
 
     return do_once
 
 
-def clear_totals(i, fate, copies, first, count):
+def clear_totals(i, outcome, copies, first, count):
     limbs = copies.shape[2]
     k, rest = i // (count * limbs), i % (count * limbs)
     copies[k, first + rest // limbs, rest % limbs] = 0
 
 
-def clear_rows(i, fate, sums, first):
+def clear_rows(i, outcome, sums, first):
     sums[first + i // sums.shape[1], i % sums.shape[1]] = 0
 
 
-def collect_total(i, fate, copies, sums, first):
+def collect_total(i, outcome, copies, sums, first):
     row, limb = first + i // copies.shape[2], i % copies.shape[2]
     total = sums[row, limb]
     for k in range(copies.shape[0]):
@@ -217,7 +217,7 @@ def collect_total(i, fate, copies, sums, first):
     sums[row, limb] = total
 
 
-def publish(i, fate, s, hooks, which):
+def publish(i, outcome, s, hooks, which):
     """Publish totals of hooks `which` = (first, end, always), or only at the end of a run."""
     begin, end, always = which
     if always or is_last(s):
@@ -225,7 +225,7 @@ def publish(i, fate, s, hooks, which):
             hook_loop.publish_total(hooks, h, s.control)
 
 
-def add_energies(i, fate, s, block, copies):
+def add_energies(i, outcome, s, block, copies):
     points, laws, kin = known_to_laws(block.points), block.laws, s.kin
     threads = -(-points.mass.size // CHUNK)
     copy = copies[index(i % len(copies))]
@@ -261,24 +261,24 @@ def _add_all(copy, first_row, solid, total):
             totals.add_to(copy, first_row + solid * len(total) + k, number)
 
 
-def add_work_at_node(i, fate, s, copies):
+def add_work_at_node(i, outcome, s, copies):
     work = field(s.nodes.fields, WorkAtNodes)
     totals.add_to(_copy_of(copies, i), totals.WORK, float(work[i, 0]))
     work[i, 0] = 0
 
 
-def add_more(i, fate, s, block, copies):
+def add_more(i, outcome, s, block, copies):
     points, more = known_to_laws(block.points), watch.more_of(block)
     watch.add_more(s.kin, points, more, _copy_of(copies, i), index(i))
 
 
-def look_before(i, fate, s):
+def look_before(i, outcome, s):
     totals.carry(s.control.totals[totals.WORK])
     watch.take_energies(s)
     watch.note_before(s.control.energy[0], int(s.control.values[TIMESTEP]))
 
 
-def look_behind(i, fate, s):
+def look_behind(i, outcome, s):
     energy = s.control.energy[0]
     if energy.stored_at != int(s.control.values[TIMESTEP]) - 1:
         return
@@ -286,4 +286,4 @@ def look_behind(i, fate, s):
     watch.take_energies(s)
     watch.take_drift(s)
     if not watch.judge(s.control):
-        fate[STATUS] = 1.0 + GAINED
+        outcome[STATUS] = 1.0 + GAINED

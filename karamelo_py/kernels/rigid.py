@@ -73,9 +73,9 @@ def _add_forces(s, block, p):
         n, weight, _ = entry(basis, kin, grid, stencil, node)
         if not weight > 0:
             continue
-        share = weight * points.mass[p] / rigid[n, MASS]
+        mass_fraction = weight * points.mass[p] / rigid[n, MASS]
         x = node_position(grid, n)
-        force = [share * rigid[n, of_force(kin) + i] if i < d else 0.0 for i in range(3)]
+        force = [mass_fraction * rigid[n, of_force(kin) + i] if i < d else 0.0 for i in range(3)]
         for i in range(3):
             j, k = (i + 1) % 3, (i + 2) % 3
             add_to(totals, first + i, force[i])

@@ -110,7 +110,7 @@ class Links(NamedTuple):
     trial: np.ndarray
     rest: np.ndarray
     trial_rest: np.ndarray
-    given: np.ndarray  # (B + 1, 6) sums of the impulses of links
+    impulses: np.ndarray  # (B + 1, 6) sums of the impulses of links
     inverse: np.ndarray  # (B + 1, 6, 6) inverse mass matrix, 0 where prescribed
     slope: np.ndarray  # (m, m + 1) matrix of the Newton step, right-hand side in the last column
     jacobian: np.ndarray  # (2, 3, 6): A and B of the present link
@@ -483,15 +483,15 @@ def _add_slope(links, link, bounded):
 @noinline
 def _residual(links, bodies, u, rest, bounded):
     """Put M U - P minus all impulses into `rest`; return its square, in units of energy."""
-    links.given[:] = 0.0
+    links.impulses[:] = 0.0
     for i in range(links.count[0]):
         _set_impulse(links, links.rows[i], u, bounded)
-        _give(links, links.rows[i], links.rows[i].impulse, links.given, False)
+        _give(links, links.rows[i], links.rows[i].impulse, links.impulses, False)
     square = 0.0
     for n, body in enumerate(bodies):
         motion.residual(body, links.dt[0], u[n], rest[n], bounded)
         for a in range(6):
-            rest[n, a] -= links.given[n, a]
+            rest[n, a] -= links.impulses[n, a]
             if body.dofs[a]:
                 square += rest[n, a] ** 2 / body.solution.mass[a, a]
     return square
@@ -705,15 +705,15 @@ def _collide(links, bodies, dt):
         _hit(links, links.rows[which])
     if fastest == 0:
         return
-    links.given[:] = 0.0
+    links.impulses[:] = 0.0
     for i in range(links.count[0]):
         link = links.rows[i]
         if link.kind == CONTACT:
             _set_jacobians(links, link)
-            _give(links, link, link.hit, links.given, False)
+            _give(links, link, link.hit, links.impulses, False)
     for n, body in enumerate(bodies):
         for a in range(6):
-            body.solution.momentum[a] += links.given[n, a]
+            body.solution.momentum[a] += links.impulses[n, a]
             body.solution.u[a] += links.jump[n, a]
         links.u[n] = body.solution.u
 
@@ -739,11 +739,11 @@ def find(links, bodies, control, kin):
 
 @noinline
 def _sum_impulses(links):
-    links.given[:] = 0.0
+    links.impulses[:] = 0.0
     for i in range(links.count[0]):
         link = links.rows[i]
         _set_jacobians(links, link)
-        _give(links, link, link.impulse, links.given, False)
+        _give(links, link, link.impulse, links.impulses, False)
 
 
 @noinline
@@ -755,7 +755,7 @@ def solve(links, bodies, control):
     for n, body in enumerate(bodies):
         body.solution.u[:] = links.u[n]
         for a in range(6):
-            body.solution.momentum[a] += links.given[n, a]
+            body.solution.momentum[a] += links.impulses[n, a]
     for i in range(links.count[0]):
         link = links.rows[i]
         for c in range(3):
@@ -765,7 +765,7 @@ def solve(links, bodies, control):
     # Published forces include collisions.
     _sum_impulses(links)
     for n, body in enumerate(bodies):
-        body.solution.given[:] = links.given[n]
+        body.solution.link_impulses[:] = links.impulses[n]
 
 
 @noinline

@@ -91,7 +91,7 @@ class Solution(NamedTuple):
     residual: np.ndarray
     trial_residual: np.ndarray
     total: np.ndarray  # (6,) sum of impulses
-    given: np.ndarray  # (6,) impulses of other bodies
+    link_impulses: np.ndarray  # (6,) impulses of other bodies
     after: np.ndarray  # (6,) momentum with contact
     before: np.ndarray  # centre before the step, (3,)
     mass: np.ndarray  # (6, 6) mass matrix
@@ -496,10 +496,10 @@ def finish_step(body, control, dimension):
     state, work, values = body.state[0], body.solution, control.values
     kick, dt, total = control.step[0].kick, values[DT], work.total
     for k in range(3):
-        state.force[k] = (work.given[k] - total[k]) / kick
-        state.torque[k] = (work.given[3 + k] - total[3 + k]) / kick
+        state.force[k] = (work.link_impulses[k] - total[k]) / kick
+        state.torque[k] = (work.link_impulses[3 + k] - total[3 + k]) / kick
     for a in range(6):
-        work.after[a], work.given[a] = work.momentum[a] - total[a], 0.0
+        work.after[a], work.link_impulses[a] = work.momentum[a] - total[a], 0.0
     _velocities_of(body, work.after)
     u, M, partly = work.u, work.mass, False
     for k in range(3):

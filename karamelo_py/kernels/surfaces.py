@@ -133,8 +133,8 @@ def _from_box(kin, surface, k, x):
     return square
 
 
-def _nearer(kin, surface, k, x, found):
-    best, face = found
+def _nearer(kin, surface, k, x, nearest):
+    best, face = nearest
     first = LEAF * (k - surface.low.shape[0] // 2)
     for i in range(first, min(first + LEAF, surface.faces.shape[0])):
         square = _squared(kin, surface, i, x)

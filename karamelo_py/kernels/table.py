@@ -566,10 +566,10 @@ MOMENTUM_AGAIN = (
 
 def shown_sums(rows: Iterable[Any]) -> tuple:
     """List the quantities of `SUMS`, and further ones that a scheme scatters before points move."""
-    found = {type(one): one for one in SUMS.quantities}
+    by_class = {type(one): one for one in SUMS.quantities}
     for row in rows:
         if isinstance(row, Gather) and isinstance(row.task, Move):
             break
         if isinstance(row, Scatter):
-            found |= {type(one): one for one in row.quantities}
-    return tuple(found.values())
+            by_class |= {type(one): one for one in row.quantities}
+    return tuple(by_class.values())

@@ -21,8 +21,8 @@ def wrong_count(
     keywords: Sequence[str],
 ) -> ScriptError:
     first = arguments[0].word() if arguments else None
-    known = any(registry.knows(family, first or "") for family in registry.families())
-    if first and expected and expected[0].kind.family and not known:
+    is_style = any(registry.knows(family, first or "") for family in registry.families())
+    if first and expected and expected[0].kind.family and not is_style:
         registry.find(expected[0].kind.family, first)  # raises an error that suggests similar names
     slots = [p for p in expected if not p.keyword]
     needed = [p for p in slots if not (p.optional or p.variadic)]

@@ -40,10 +40,10 @@ def names_in(statements: Iterable[Statement]) -> tuple[set[str], dict[str, None]
             style = next(code for code in codes[:2] if registry.knows(name, code))
             expected = signature.parameters(registry.find(name, style))
         formula = any(p.kind.with_numbers for p in expected)
-        own = {word for word, _ in named if formula} - {p.name for p in expected}
+        in_formulas = {word for word, _ in named if formula} - {p.name for p in expected}
         for word, value in named:
             words = set(re.findall(_WORD, value if formula else re.sub(r'"[^"\n]*"', " ", value)))
-            read |= words if word in own - {""} else words - own
+            read |= words if word in in_formulas - {""} else words - in_formulas
             hint = f"write {word} = {value} on a separate line, and {word}={word} in {name}(...)"
             hints[word] = hint
     return read, assigned, hints

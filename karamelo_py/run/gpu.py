@@ -29,7 +29,7 @@ from karamelo_py.points.laws import is_rigid
 from karamelo_py.run.checkpoint.arrays import kept_at_nodes, of_nodes
 from karamelo_py.script.formula import GLOBAL, UNIFORM, evaluate_in_table
 
-POLL = 64  # steps between reads of `fate`
+POLL = 64  # steps between reads of `outcome`
 FAR = 1.0  # distance in cells that points move before they are reordered
 PARTS = "begin", "step", "last step", "before", "behind", "order"  # names of launches
 Hooks = tuple[arrays.Hooks | arrays.NoHooks, Sequence[Callable]]
@@ -82,12 +82,12 @@ class StepsOnCard:
         self.card, self.s, (self.hooks, self.functions) = card, (s := there(s)), hooks
         self.table = () if isinstance(self.hooks, arrays.NoHooks) else self.hooks.table
         self.images = Images(card)
-        self.fate = np.zeros(5)
+        self.outcome = np.zeros(5)
         self.nodes = len(s.nodes.sums)
         self.use = np.zeros(self.nodes, np.int8)
         self.copies = np.zeros((card.copies, *s.control.totals.shape), np.int64)
         self.heavy = np.zeros(max(len(self.functions), 1), np.int64)
-        self.images.of((self.fate, self.use, self.copies, self.heavy))
+        self.images.of((self.outcome, self.use, self.copies, self.heavy))
         self.images.send([self.copies, self.heavy])
         self.corners = int(support(s.basis, s.kin)) // gpu.nodes_in_cell(s.basis, s.kin)
         self.visits: dict[int, gpu.Stage] = {}
@@ -136,9 +136,9 @@ class StepsOnCard:
     def launch(
         self, function: Callable, count: int, *arguments: Any, called: dict | None = None
     ) -> KernelLaunch:
-        """Return a launch of ``function(i, fate, *arguments)`` in `count` threads per step."""
+        """Return a launch of ``function(i, outcome, *arguments)`` in `count` threads per step."""
         function = gpu.while_steps_go_on(function)
-        return KernelLaunch(self.images, function, count, self.fate, *arguments, called=called)
+        return KernelLaunch(self.images, function, count, self.outcome, *arguments, called=called)
 
     def of_points(self, function: Callable, block: Any, *rest: Any, **more: Any) -> KernelLaunch:
         return self.launch(function, block.points.mass.size, self.s, block, *rest, **more)
@@ -370,14 +370,14 @@ class StepsOnCard:
     @property
     def wrong(self) -> int:
         """Return the lowest number of the points that have failed."""
-        return int(gpu.BEHIND - self.fate[gpu.WRONG])
+        return int(gpu.BEHIND - self.outcome[gpu.WRONG])
 
     def advance(self, count: int) -> int:
         """Take up to `count` steps; return DONE, or the status that ended them."""
         control = self.s.control
         records = control.step, control.motion, control.energy, control.heat
-        exchanged = [self.fate, *records, control.values, control.totals]
-        self.fate[: gpu.DRIFT] = 0
+        exchanged = [self.outcome, *records, control.values, control.totals]
+        self.outcome[: gpu.DRIFT] = 0
         self.images.send(exchanged)
         begun, watched = int(control.values[arrays.TIMESTEP]), control.energy[0].watch_energy
         do = self._do
@@ -391,16 +391,16 @@ class StepsOnCard:
                 do["behind" if looked else "before"]()
             self.end()
             if (n + 1) % POLL == 0:
-                self.images.fetch([self.fate])
-                if self.fate[gpu.STATUS] > 0:
+                self.images.fetch([self.outcome])
+                if self.outcome[gpu.STATUS] > 0:
                     break
                 self._order_if_due()
         self.images.fetch(exchanged)
-        status = self.fate[gpu.STATUS]
+        status = self.outcome[gpu.STATUS]
         return int(status) - 1 if status > 0 else DONE
 
     def _order_if_due(self) -> None:
-        gone = self.fate[gpu.DRIFT]
+        gone = self.outcome[gpu.DRIFT]
         if gone - self.ordered > FAR:
             self.ordered = gone
             self._do["order"]()

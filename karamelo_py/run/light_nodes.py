@@ -26,7 +26,7 @@ from karamelo_py.points.laws.strengths import shear_modulus
 from karamelo_py.scene.hub import Hub
 from karamelo_py.scene.solid import Solid
 
-LIGHT_SHARE = 0.9  # fraction of an inner node's mass
+LIGHT_FRACTION = 0.9  # fraction of an inner node's mass
 MOST_PAIRS = 100_000  # number of point-node pairs up to which all nodes are used
 LANCZOS_STEPS = 24  # enough for the highest frequency within 1 %
 
@@ -37,7 +37,7 @@ class _Line(NamedTuple):
     slopes: np.ndarray  # (n, m) gradients of the weights
 
 
-def stable_share(hub: Hub, grids: NamedTuple) -> float:
+def stable_courant(hub: Hub, grids: NamedTuple) -> float:
     """Return the stable step / (h/c) for the nodes of all solids; inf if it is unknown.
 
     The result is rounded down to four digits, so that the order of sums cannot change it.
@@ -45,12 +45,12 @@ def stable_share(hub: Hub, grids: NamedTuple) -> float:
     if not along.defined(type(hub.update.method.basis)):
         return inf
     solids = [s for s in hub.solids.values() if not s.rigid]
-    limits = [_stable_share(hub, solid, grids) for solid in solids if solid.count]
+    limits = [_stable_courant(hub, solid, grids) for solid in solids if solid.count]
     least = min(limits, default=inf)
     return floor(1e4 * least) / 1e4 if least < inf else inf
 
 
-def _stable_share(hub: Hub, solid: Solid, grids: NamedTuple) -> float:
+def _stable_courant(hub: Hub, solid: Solid, grids: NamedTuple) -> float:
     method, volume = hub.update.method, solid.volume0
     kin = method.kinematics(hub)
     places = method.places(kin, solid, float)
@@ -74,7 +74,7 @@ def _stable_share(hub: Hub, solid: Solid, grids: NamedTuple) -> float:
     area = volume if radius is None else volume / radius**kin.hoops
     none = np.zeros(count)
     filled = sum((np.bincount(nodes(k), area * weight(k), count) for k in pairs), none)
-    limit = LIGHT_SHARE * filled.max()
+    limit = LIGHT_FRACTION * filled.max()
     while True:
         seen = (filled > 0) & (filled < limit)
         for _ in range(2):  # points of light nodes, then points with a node of these
@@ -96,7 +96,7 @@ def _stable_share(hub: Hub, solid: Solid, grids: NamedTuple) -> float:
     hoop = None
     if radius is not None:
         hoop = np.stack([weight(k)[near] / radius[near] for k in pairs], 1)
-    shear = _shear_share(law_on(solid.material.whole, solid.h, solid.T0), kin)
+    shear = _shear_fraction(law_on(solid.material.whole, solid.h, solid.T0), kin)
     root = np.sqrt(mass[seen])
     root[root == 0] = inf
 
@@ -133,7 +133,7 @@ def _line(basis: Tag, kin: Tag, grid: Tag, places: np.ndarray, direction: int) -
     )
 
 
-def _shear_share(law: Tag, kin: Tag) -> float:
+def _shear_fraction(law: Tag, kin: Tag) -> float:
     """Return shear modulus / P-wave modulus, at most 1/2 (Poisson's ratio 0)."""
     strength = parameter(law, "strength", None)
     G = parameter(law, "G", None) or (shear_modulus(strength) if strength else inf)

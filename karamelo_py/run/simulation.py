@@ -21,7 +21,7 @@ from karamelo_py.kernels.hooks import POINT_STAGES
 from karamelo_py.kernels.step import DONE, SORT, Fused, Staged, StepKind, advance, run_steps
 from karamelo_py.kernels.totals import WORK, add_to
 from karamelo_py.run.energy import EnergyWatch
-from karamelo_py.run.light_nodes import stable_share
+from karamelo_py.run.light_nodes import stable_courant
 from karamelo_py.run.lower.bodies import check_bodies
 from karamelo_py.run.lower.build import points_at_rest
 from karamelo_py.run.lower.hooks import ActingFixes, FixesOfRun, views_of
@@ -69,7 +69,7 @@ class Simulation(SceneArrays):
 
     @cached_property
     def light_nodes(self) -> float:
-        return stable_share(self.hub, self.setup.grids)
+        return stable_courant(self.hub, self.setup.grids)
 
     @property
     def ruling_limit(self) -> str:

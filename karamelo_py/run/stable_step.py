@@ -28,7 +28,7 @@ from karamelo_py.run.body_motion import motions
 from karamelo_py.run.state import SceneState
 from karamelo_py.scene.hub import Hub
 from karamelo_py.scene.solid import Solid
-from karamelo_py.schemes.traits import DEFAULT_SHARE, SchemeTraits
+from karamelo_py.schemes.traits import DEFAULT_FRACTION, SchemeTraits
 
 BOX_WEIGHT = 6.0  # weight of the common velocity, for domains that are boxes
 SLOWED = 1.2  # viscous / elastic wave speed above which viscosity limits the step
@@ -60,14 +60,14 @@ def conserving_fraction(hub: Hub) -> float:
     update = hub.update
     alpha = flip_coefficient(update.transfer)
     if not update.method.frame.moves or not alpha > 0.9:
-        return DEFAULT_SHARE
+        return DEFAULT_FRACTION
     basis = update.method.basis.traits
     kind = basis.nodes_per_cell if basis.gradient_jumps else 0
-    conserving = update.scheme.traits.conserving or ((DEFAULT_SHARE, DEFAULT_SHARE),) * 3
-    share = conserving[kind][sparse(hub)]
+    conserving = update.scheme.traits.conserving or ((DEFAULT_FRACTION, DEFAULT_FRACTION),) * 3
+    fraction = conserving[kind][sparse(hub)]
     if alpha > 0.99:
-        return share
-    return max(share, DAMPED) if sparse(hub) else DEFAULT_SHARE
+        return fraction
+    return max(fraction, DAMPED) if sparse(hub) else DEFAULT_FRACTION
 
 
 def _retains_velocities(hub: Hub) -> bool:
@@ -97,7 +97,7 @@ def lone_point(hub: Hub) -> float:
     The pressure accelerates the stored velocity gradient L by dL/dt = -p / (rho D). This is an
     oscillator of frequency c sqrt(d / D), stable up to dt = 2 sqrt(D / d) / c. If points store
     gradients, sums of |grad N|^2 / N replace 1 / D. Points of flowing material may become isolated;
-    points of gases then store no moments (`kernels.equations.loss.in_company`).
+    points of gases then store no moments (`kernels.equations.loss.retained_moment`).
     """
     update = hub.update
     keeps = stores_moment(hub.update.transfer) and update.method.frame.moves
@@ -107,9 +107,9 @@ def lone_point(hub: Hub) -> float:
         return inf
     by_gradient = not update.transfer.traits.inverts_spread
     usl = min(update.scheme.traits.courant) < 1 and not by_gradient
-    share = CORRECTED_LONE if update.method.corrected else LONE
-    share *= update.transfer.traits.lone_shares[usl]
-    return share * 2 / sqrt(stiff[2 if usl else by_gradient] * hub.domain.dimension)
+    factor = CORRECTED_LONE if update.method.corrected else LONE
+    factor *= update.transfer.traits.lone_fractions[usl]
+    return factor * 2 / sqrt(stiff[2 if usl else by_gradient] * hub.domain.dimension)
 
 
 def allows_drift(hub: Hub) -> bool:
@@ -127,7 +127,7 @@ def allows_drift(hub: Hub) -> bool:
         and not _flows(laws[0])
         and not basis.gradient_jumps
         and (basis.allows_drift or scheme.traits.allows_drift)
-        and conserving_fraction(hub) == DEFAULT_SHARE
+        and conserving_fraction(hub) == DEFAULT_FRACTION
     )
 
 
@@ -166,16 +166,16 @@ def courant_number(hub: Hub, *, longer: bool) -> float:
     if stores_moment(update.transfer) and total:
         courant = min(courant, hub.simulation.light_nodes)
         if update.scheme.traits.maps_velocity_again:
-            courant *= update.transfer.traits.share_in_total
-    return courant * corrected_share(hub)
+            courant *= update.transfer.traits.fraction_in_total
+    return courant * corrected_fraction(hub)
 
 
-def corrected_share(hub: Hub) -> float:
+def corrected_fraction(hub: Hub) -> float:
     """Return the factor by which mass=corrected changes the stable step."""
     method = hub.update.method
     if not method.corrected:
         return 1.0
-    return method.basis.traits.corrected_share if method.frame.moves else CORRECTED_TOTAL
+    return method.basis.traits.corrected_fraction if method.frame.moves else CORRECTED_TOTAL
 
 
 def courant_of(hub: Hub, scheme: Tag) -> tuple[float, float]:
@@ -218,14 +218,15 @@ def own_step_of_waves(hub: Hub, *, still: bool) -> tuple[float, float]:
 
     `still`: no point has moved as far as `STILL`.
     """
-    method, share = hub.update.method, conserving_fraction(hub)
+    method, fraction = hub.update.method, conserving_fraction(hub)
     # Transfers with moments are stable up to 1.3 h/c with quadratic splines, 1.5 with cubic.
     still &= method.frame.moves and not stores_moment(hub.update.transfer)
     if still:
         # With a linear basis in 3D, an isolated point is stable up to 0.8 h/c.
-        share = max(share, DAMPED if sparse(hub) and hub.domain.dimension == 3 else DEFAULT_SHARE)
+        damps = sparse(hub) and hub.domain.dimension == 3
+        fraction = max(fraction, DAMPED if damps else DEFAULT_FRACTION)
     courant = courant_number(hub, longer=still or allows_drift(hub))
-    return min(courant, lone_point(hub)), share
+    return min(courant, lone_point(hub)), fraction
 
 
 def fastest_wave(simulation: SceneState) -> float:
@@ -284,7 +285,7 @@ def ruling_limit(state: SceneState) -> str:
     slowed = any(viscous for _, viscous in undeformed)
     if slowed and 0 < without < (rate - speed) / SLOWED:
         return "viscosity"
-    own = state.hub.update.scheme.traits.solves_pressure
-    if step.courant < corrected_share(state.hub) and not own:
+    solves_pressure = state.hub.update.scheme.traits.solves_pressure
+    if step.courant < corrected_fraction(state.hub) and not solves_pressure:
         return "lone_points" if step.courant == lone_point(state.hub) else "light_nodes"
     return "waves"

@@ -23,7 +23,7 @@ from karamelo_py.run.stable_step import (
 )
 from karamelo_py.run.state import SceneState
 from karamelo_py.scene.hub import Hub
-from karamelo_py.schemes.traits import DEFAULT_SHARE
+from karamelo_py.schemes.traits import DEFAULT_FRACTION
 from karamelo_py.script.errors import ScriptError
 
 NO_STRIDE = 1e9  # path in cells that points never reach
@@ -42,20 +42,20 @@ class StepPolicy(NamedTuple):
         fixed = update.fixed_dt or float(update.scheme.traits.implicit)  # implicit: 1 by default
         if update.dt_factor is None and update.fixed_dt is None:
             still, moving = (own_step_of_waves(hub, still=still) for still in (True, False))
-            return cls(still, moving, own_weight_of_drift(hub), fixed, DEFAULT_SHARE)
+            return cls(still, moving, own_weight_of_drift(hub), fixed, DEFAULT_FRACTION)
         # Fractions that scripts set refer to h/(c + |v|), even if the points are at rest.
         asked = courant_number(hub, longer=False), update.dt_factor or conserving_fraction(hub)
-        return cls(asked, asked, 1.0, fixed, update.dt_factor or DEFAULT_SHARE)
+        return cls(asked, asked, 1.0, fixed, update.dt_factor or DEFAULT_FRACTION)
 
     def numbers(self, path: float, halvings: int) -> dict[str, float]:
         """Return clock fields for points whose longest path so far is `path`, in cells."""
-        (courant, share), scale = self.still if path <= STILL else self.moving, 1 / 2**halvings
+        (courant, fraction), scale = self.still if path <= STILL else self.moving, 1 / 2**halvings
         return {
             "courant": courant,
             "courant_moving": self.moving[0],
             "fixed_dt": self.fixed_dt * scale,
             "heat_factor": self.heat_factor * scale,
-            "dt_factor": share * scale,
+            "dt_factor": fraction * scale,
             "dt_factor_moving": self.moving[1] * scale,
         }
 

@@ -6,7 +6,7 @@ from typing import Any, NamedTuple
 from karamelo_py.kernels.equations.transfer_loss import TransferLoss
 from karamelo_py.language.rules import Restrictions
 
-DEFAULT_SHARE = 0.9  # fraction of the stable step
+DEFAULT_FRACTION = 0.9  # fraction of the stable step
 
 IMPLICIT = Restrictions(
     "implicit", "an explicit scheme, scheme(musl)",

@@ -78,16 +78,16 @@ class Returned(NamedTuple):
 
 def versions(plugins: Iterable[str]) -> dict[str, str]:
     """Return versions of the program and of what it needs, and hashes of plug-ins' sources."""
-    found = dict(surroundings()["versions"])
-    found["python"] = ".".join(found["python"].split(".")[:2])
+    result = dict(surroundings()["versions"])
+    result["python"] = ".".join(result["python"].split(".")[:2])
     for module in plugins:
         spec = PathFinder.find_spec(module)
         paths = [Path(spec.origin)] if spec and spec.origin else []
         for folder in (spec and spec.submodule_search_locations) or ():
             paths += sorted(Path(folder).rglob("*.py"))
         content = b"".join(path.read_bytes() for path in paths)
-        found[module] = _hash(content)[:8] if paths else "none"
-    return found
+        result[module] = _hash(content)[:8] if paths else "none"
+    return result
 
 
 def _hash(content: bytes) -> str:
@@ -127,16 +127,16 @@ def packed(
     )  # fmt: skip
 
 
-def _modules(folder: Path, name: str, found: frozenset[Path] = frozenset()) -> set[Path]:
+def _modules(folder: Path, name: str, seen: frozenset[Path] = frozenset()) -> set[Path]:
     """Return the source files, next to a script, of a module and of all modules that it imports."""
     path = Path(abspath(folder / f"{name}.py"))
-    if path in found or not path.is_file():
+    if path in seen or not path.is_file():
         return set()
-    known = {path, *found}
+    paths = {path, *seen}
     for words in IMPORTED.findall(path.read_text(encoding="utf-8", errors="replace")):
         for other in words.split(","):
-            known |= _modules(folder, [*other.split(), ""][0], frozenset(known))
-    return known
+            paths |= _modules(folder, [*other.split(), ""][0], frozenset(paths))
+    return paths
 
 
 class Site:

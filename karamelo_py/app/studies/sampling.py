@@ -66,10 +66,10 @@ def _law(name: str, kind: str, text: str) -> Any:
 
     if kind not in KINDS:
         raise unknown(f"-var {name}: unknown distribution '{kind}'", kind, KINDS)
-    given = [piece.strip() for piece in text.split(",")]
-    names, numbers = re.findall(r"\w+", KINDS[kind])[1:], [number_of(word) for word in given]
-    counted = len(given) == len(names) and None not in numbers and np.isfinite(numbers).all()
-    if not counted or not holds(RULES[kind], dict(zip(names, given, strict=True))):
+    pieces = [piece.strip() for piece in text.split(",")]
+    names, numbers = re.findall(r"\w+", KINDS[kind])[1:], [number_of(word) for word in pieces]
+    counted = len(pieces) == len(names) and None not in numbers and np.isfinite(numbers).all()
+    if not counted or not holds(RULES[kind], dict(zip(names, pieces, strict=True))):
         expected = f"{KINDS[kind]} with numbers, {RULES[kind]}"
         raise ScriptError(f"-var {name}: {kind}({text})", expected=expected)
     a, b, c = [*numbers, 0.0][:3]

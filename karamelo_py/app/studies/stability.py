@@ -133,7 +133,7 @@ def run(options: Namespace) -> int:
     finally:
         if chart.results:
             records.write(table, chart.rows())
-            fixed = [f"{name} = {given[0]}" for name, given in values.items() if len(given) == 1]
+            fixed = [f"{name} = {one[0]}" for name, one in values.items() if len(one) == 1]
             title = options.title or ", ".join([variables.title_of(options.script), *fixed])
             chart.draw(out, title, words)
     chart.tell()

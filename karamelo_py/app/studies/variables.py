@@ -183,8 +183,8 @@ class ScriptFiles:
         for name in names:
             if name not in read and self.all_known:
                 fault = "sets it and never reads it" if name in assigned else "has no such variable"
-                known = sorted(assigned.keys() & read)
-                error = unknown(f"-var {name}: {self.path} {fault}", name, known)
+                settable = sorted(assigned.keys() & read)
+                error = unknown(f"-var {name}: {self.path} {fault}", name, settable)
                 error.hint = hints.get(name, error.hint)
                 raise error
 

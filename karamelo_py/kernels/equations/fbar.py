@@ -159,8 +159,8 @@ def averaged(pt, dl, ratio):
 def corrected(pt, dl, f):
     """Scale `dl` by a point's `VolumeCorrection`, if there is one."""
     for more in pt.load(VolumeCorrection, (pt.dt,)):
-        share = more / len(dl.axes)
-        dl = (1 + share) * dl + share * (I if pt.w.frame.moves else f)
+        per_axis = more / len(dl.axes)
+        dl = (1 + per_axis) * dl + per_axis * (I if pt.w.frame.moves else f)
     return dl
 
 

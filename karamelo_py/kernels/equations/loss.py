@@ -111,7 +111,7 @@ def warm(pt, v):
         moment = transfers.zero_moment(pt.w.transfer, pt.kin, v[0])
         for node in pt.nodes:
             moment = transfers.add_moment(pt.w.transfer, node, _before(node, v), moment)
-        _heat(pt, _gone(pt, v, in_company(pt, moment)))
+        _heat(pt, _gone(pt, v, retained_moment(pt, moment)))
     if pt.of(Reflected) is not None:
         last = v - v
         for node in pt.nodes:
@@ -120,7 +120,7 @@ def warm(pt, v):
         _heat(pt, pt.of(Reflected)[0, pt.p])
 
 
-def in_company(pt, moment):
+def retained_moment(pt, moment):
     """Return the part of the `moment` that a point of gas retains: none if the point is isolated.
 
     Nodes without other points would return the whole moment, and the pressure would expand the
@@ -130,10 +130,10 @@ def in_company(pt, moment):
     if lost is None or len(moment) == 0:
         return moment
     mass = pt.w.points.mass[pt.p]
-    one, share = real(1, mass), mass - mass
+    one, mass_fraction = real(1, mass), mass - mass
     for node in pt.nodes:  # mass fraction of the point at its nodes
-        share += node.N * node.N * mass / max(lost[node.i, 2], real(1e-36, mass))
-    kept = (one - share) / real(1 - ALONE**pt.kin.dimension, mass)
+        mass_fraction += node.N * node.N * mass / max(lost[node.i, 2], real(1e-36, mass))
+    kept = (one - mass_fraction) / real(1 - ALONE**pt.kin.dimension, mass)
     return transfers.fraction(pt.w.transfer, moment, max(min(kept, one), mass - mass))
 
 

@@ -7,7 +7,7 @@ from karamelo_py.compiler.fields import Field, field, forget, increase, store, v
 from karamelo_py.kernels import arrays
 from karamelo_py.kernels.equations import Report, Task
 from karamelo_py.kernels.equations.internal_force import Force, WorkOfForces
-from karamelo_py.kernels.equations.loss import in_company, warm, warm_by_friction
+from karamelo_py.kernels.equations.loss import retained_moment, warm, warm_by_friction
 from karamelo_py.kernels.equations.strain import further_reach
 from karamelo_py.kernels.equations.transfer_loss import count_loss
 from karamelo_py.kernels.views import location_at
@@ -60,7 +60,7 @@ class Move(Task):
             increase(pt.of(WorkOfForces), pt.p, (work,))
         warm_by_friction(pt)
         warm(pt, v_pic - dv)
-        moment = towards_walls(pt, in_company(pt, moment))
+        moment = towards_walls(pt, retained_moment(pt, moment))
         count_loss(pt, v, dv, moment)
         y, v, moment, hits = reflected(w.grid, w.kin, y, v, moment)
         increase(pt.of(Bounces), pt.p, hits)
@@ -86,13 +86,13 @@ def towards_walls(pt, moment):
     The limit is for isolated points. Some transfers retain more if other points are near.
     """
     kept = retained(pt.w.basis, pt.stencil) if len(moment) else ()
-    if kept and pt.w.transfer.traits.by_company:
+    if kept and pt.w.transfer.traits.by_neighbours:
         mass = field(pt.w.nodes.fields, transfers.NodalMass)
-        own = pt.w.points.mass[pt.p]
-        share, least = own - own, real(1e-36, own)
+        mass_of_point = pt.w.points.mass[pt.p]
+        mass_fraction, least = mass_of_point - mass_of_point, real(1e-36, mass_of_point)
         for node in pt.nodes:
-            share += node.N * node.N * own / max(mass[node.i, 0], least)
-        kept = tuple([1 - share * (1 - one) for one in kept])
+            mass_fraction += node.N * node.N * mass_of_point / max(mass[node.i, 0], least)
+        kept = tuple([1 - mass_fraction * (1 - one) for one in kept])
     return transfers.narrowed(pt.w.transfer, moment, kept) if kept else moment
 
 

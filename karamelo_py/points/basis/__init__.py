@@ -33,7 +33,7 @@ class BasisTraits(NamedTuple):
     # D / h^2, or None if it varies. Mapping to the nodes and back damps waves in proportion to it.
     spread: float | None = None
     # Fraction of the stable step with corrected accelerations (updated frame).
-    corrected_share: float = 0.8
+    corrected_fraction: float = 0.8
     allows_drift: bool = False  # drifting bodies conserve energy at the full stable step
     drift_limits: DriftLimits | None = None  # None: the limits of similar bases
     # Stored domain data, in order: ``half_size`` (d numbers), ``half_edges`` (d vectors),

@@ -193,7 +193,7 @@ class CubicSpline(NamedTuple):
         steep_edge=False,
         lone=(3.0, 3.14, 3.3),
         spread=1 / 3,
-        corrected_share=0.95,
+        corrected_fraction=0.95,
         courant_total=1.25,
         courant_still=1.4,
         courant_strained_first=1.0,

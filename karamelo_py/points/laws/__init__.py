@@ -186,13 +186,13 @@ def columns_of(law: NamedTuple) -> dict[str, NamedTuple]:
     if within.defined(type(law)):
         tags = {name: Within(tag) for name, tag in tags.items()}
     kind = type(law)
-    own: dict[str, NamedTuple] = {}
+    own_tags: dict[str, NamedTuple] = {}
     for base in reversed(kind.__mro__):
         declared = _columns.get(base, {})
-        own = {} if declared is None else own | declared
+        own_tags = {} if declared is None else own_tags | declared
     if dissipated_energy.defined(kind) and dissipated_energy.find((kind,)) not in _delegating:
-        own.setdefault("dissipated", dissipated_energy.tag)
-    return tags | own
+        own_tags.setdefault("dissipated", dissipated_energy.tag)
+    return tags | own_tags
 
 
 @point_function(otherwise=True)

@@ -315,8 +315,8 @@ def flow(strength, before, increment, dt):
 
 
 def yield_stress(strength: Any) -> float:
-    known = flow_stress.defined(type(strength))
-    if not known and not isinstance(strength, Plastic | LinearHardening):
+    has_flow_stress = flow_stress.defined(type(strength))
+    if not has_flow_stress and not isinstance(strength, Plastic | LinearHardening):
         return 0.0
     return flow(strength, before_flow(strength, initial_memory(strength, 1.0), ()), 0.0, 1.0)[0]
 

@@ -275,10 +275,10 @@ def decayed(branches, memory, dl, added, dt):
 def stiffness_along(branches, added, strain, last):
     """Return shear stiffness along a strain increment / stiffness at rest, or the `last` one."""
     square = inner(strain, strain)
-    known = square > (ENOUGH * round_off(square)) ** 2
+    precise = square > (ENOUGH * round_off(square)) ** 2
     # At rest, 1/(2 G) is 2 g softness.
-    rise = inner(added, strain) / where(known, square, 1) * (2 * branches.g * branches.softness)
-    return where(known & (rise > LEAST), rise, last)
+    rise = inner(added, strain) / where(precise, square, 1) * (2 * branches.g * branches.softness)
+    return where(precise & (rise > LEAST), rise, last)
 
 
 def strain_of(dl):

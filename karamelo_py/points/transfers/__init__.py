@@ -22,11 +22,11 @@ class TransferTraits(NamedTuple):
     keeps_gradient: bool = False  # `Moment` is the velocity gradient
     series: bool = False  # the new velocity is a series, which needs further passes over the points
     # Fraction of the stable step with musl in the total frame.
-    share_in_total: float = 1.0
+    fraction_in_total: float = 1.0
     # Fractions of the stable step of isolated points in flowing material, with musl and with usl.
-    lone_shares: tuple[float, float] = (1.0, 1.0)
+    lone_fractions: tuple[float, float] = (1.0, 1.0)
     # Points at walls retain more of their gradients if other points are near.
-    by_company: bool = False
+    by_neighbours: bool = False
     restrictions: Restrictions | None = None
 
 

@@ -51,7 +51,7 @@ class PolyPIC(NamedTuple):
     point_fields = (Modes,)
     traits = TransferTraits(
         keeps_gradient=True,
-        share_in_total=0.75,  # a vibrating block gains energy at 0.9 h/c, but not at 0.7
+        fraction_in_total=0.75,  # a vibrating block gains energy at 0.9 h/c, but not at 0.7
         restrictions=Restrictions(
             "transfer PolyPIC", "APIC",
             only={"method": ("tlmpm",), "basis": ("linear",)},

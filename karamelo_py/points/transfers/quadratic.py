@@ -59,8 +59,8 @@ class PolyPICQuadratic(NamedTuple):
         inverts_spread=True,
         # A dam break with three points per cell gained energy at 0.6 and 0.4 of the stable step of
         # isolated points, and ran to its end with 0.4 and 0.25.
-        lone_shares=(0.4, 0.25),
-        by_company=True,
+        lone_fractions=(0.4, 0.25),
+        by_neighbours=True,
         restrictions=Restrictions(
             "transfer PolyPIC/quadratic", "APIC",
             only={"method": ("ulmpm", "ulmpm/contacts"), "basis": ("cubic-spline",)},
@@ -89,14 +89,14 @@ def modes(node):
     lines, at = node.stencil.lines, places_of(node.stencil, node.k)
     of = [moments_of(line) for line in lines]
     arms = [n - line.r for line, n in zip(lines, at, strict=True)]
-    found = []
+    pairs = []
     for i, j in PAIRS[node.kin.dimension]:
         if i == j:
             q = arms[i] * (arms[i] - of[i].skew) - of[i].second
-            found.append((q, of[i].curved))
+            pairs.append((q, of[i].curved))
         else:
-            found.append((arms[i] * arms[j], of[i].second * of[j].second))
-    return found
+            pairs.append((arms[i] * arms[j], of[i].second * of[j].second))
+    return pairs
 
 
 def inverse(square):

@@ -67,10 +67,10 @@ class Contact:
 
         `nodes` (m,) are the nodes of the body.
         """
-        own = (nodes[self.first] | nodes[self.second]) & (self.stiffness > 0)
-        if np.any(own) and not np.any(self.close[own]):
+        mask = (nodes[self.first] | nodes[self.second]) & (self.stiffness > 0)
+        if np.any(mask) and not np.any(self.close[mask]):
             near = CLOSE * float(np.min(self.s.grids.spacing))
-            self.close |= own & (self.gap <= self.gap[own].min() + near)
+            self.close |= mask & (self.gap <= self.gap[mask].min() + near)
             self.respond(np.zeros((len(nodes), self.d)), supposed=True)
 
     def _shares(self) -> np.ndarray:
@@ -236,6 +236,6 @@ class Contact:
         nodes, mass = self.equations.nodes, self.equations.mass
         heat[nodes] = 0
         work = (self.drag * self.slip).sum(1) * ~self.sticks
-        share = self.tag.warmth[self.a, self.b]
-        for at, fraction in ((self.first, share), (self.second, 1 - share)):
+        to_first = self.tag.warmth[self.a, self.b]
+        for at, fraction in ((self.first, to_first), (self.second, 1 - to_first)):
             np.add.at(heat[:, 0], nodes[at], fraction * work / mass[at])

@@ -373,8 +373,8 @@ class Equations:
             means = np.divide(sums[:, 0], sums[:, 1], out=none, where=sums[:, 1] > 0)
             least = means[lines].min(1, initial=np.inf)
             weights = weights * np.where(np.isfinite(least), least, 0.0) / moduli.mean
-        share = 1 / 3 / 2 ** (self.d - 1)
-        return (share * (D.T @ sp.diags(weights) @ D)).tocsr()
+        factor = 1 / 3 / 2 ** (self.d - 1)
+        return (factor * (D.T @ sp.diags(weights) @ D)).tocsr()
 
     @cached_property
     def differences(self) -> tuple[np.ndarray, np.ndarray, sp.csr_matrix]:

@@ -59,9 +59,9 @@ class LoadedBody:
         motion.move(body, dt, d, True)
         for block in blocks:
             points = block.points
-            own = (points.id >= body.ids[0]) & (points.id < body.ids[1])
-            arm = points.x[control.motion[0].now][:, own].astype(float) - work.before[:d, None]
-            points.v[:, own] = state.move[:d, None] + state.spread[:d, :d] @ arm
+            mask = (points.id >= body.ids[0]) & (points.id < body.ids[1])
+            arm = points.x[control.motion[0].now][:, mask].astype(float) - work.before[:d, None]
+            points.v[:, mask] = state.move[:d, None] + state.spread[:d, :d] @ arm
         state.v[:] = state.spin[:] = state.momentum[:] = 0.0
         motion.publish(body, control.values)
 
@@ -100,16 +100,16 @@ class MovingBodies:
         """Project contact stiffness (m d, m d) and unbalanced forces (m, d) onto the bodies."""
         below = self.T.T @ contact
         unknown = sp.diags(free.ravel().astype(float))
-        own = (below @ self.T).tocsr()
+        stiffness = (below @ self.T).tocsr()
         # Regularise directions without contact, which have no load.
         weak = max(WEAK * float(np.abs(contact.data).max(initial=0.0)), 1e-300) * self.lever**2
-        self.parts = unknown @ contact @ self.T, below @ unknown, own + sp.diags(weak)
+        self.parts = unknown @ contact @ self.T, below @ unknown, stiffness + sp.diags(weak)
         self.left = self.rest(balance)
 
     def solve(self, A: sp.spmatrix, b: np.ndarray, kept: dict) -> np.ndarray:
         """Solve for the motions of the bodies, too; return changes of displacements (m, d)."""
-        right, below, own = self.parts
-        whole = sp.bmat([[A, right], [below, own]]).tocsr()
+        right, below, stiffness = self.parts
+        whole = sp.bmat([[A, right], [below, stiffness]]).tocsr()
         x = solvers.direct(whole, np.concatenate([b, self.left]), kept)
         if not np.all(np.isfinite(x)):
             raise solvers.Singular

@@ -41,12 +41,12 @@ def bisected(places: np.ndarray, work: np.ndarray, parts: int, rows: float = 1) 
     """
     d = places.shape[1]
     least = np.append(np.ones(d - 1), rows)
-    share = np.zeros(len(work), np.int64)
+    part = np.zeros(len(work), np.int64)
     left = [(np.arange(len(work)), 0, parts)]
     while left:
         tiles, first, count = left.pop()
         if count == 1:
-            share[tiles] = first
+            part[tiles] = first
             continue
         busy = places[tiles[work[tiles] > 0]]
         lengths = np.ptp(busy, axis=0) if len(busy) else np.ones(d)
@@ -57,7 +57,7 @@ def bisected(places: np.ndarray, work: np.ndarray, parts: int, rows: float = 1) 
         half = count // 2
         cut = np.searchsorted(ends - 0.5 * work[tiles], ends[-1:].sum() * (half / count))
         left += [(tiles[:cut], first, half), (tiles[cut:], first + half, count - half)]
-    return share
+    return part
 
 
 IMBALANCE = 1.1  # factor by which a new division must reduce the largest work

@@ -90,8 +90,8 @@ class Subdomain(WholeDomain):
         s, blocks = simulation.setup, []
         tiles.empty_nodes(s)
         for k, block in enumerate(s.blocks):
-            tilings = [partition.stripped(share, f"tiling/{k}/") for share in shares]
-            points = [partition.stripped(share, f"points/{k}/") for share in shares]
+            tilings = [partition.stripped(subdomain, f"tiling/{k}/") for subdomain in shares]
+            points = [partition.stripped(subdomain, f"points/{k}/") for subdomain in shares]
             order = partition.by_tile(tilings)
             arrays = {
                 name: np.take(

@@ -82,8 +82,8 @@ class Whole:
         blocks = []
         blocks_here = zip(self.setup.blocks, simulation.setup.blocks, strict=True)
         for k, (block, mine) in enumerate(blocks_here):
-            counts = [share["counts"][k] for share in parts or ()]
-            order = by_tile([share["tiling"][k] for share in parts]) if comm.leads else None
+            counts = [subdomain["counts"][k] for subdomain in parts or ()]
+            order = by_tile([subdomain["tiling"][k] for subdomain in parts]) if comm.leads else None
             points = sized(block.points, sum(counts)) if comm.leads else block.points
             rows = [array for _, array in arrays_of(points)]
             for row, (_, array) in zip(rows, arrays_of(mine.points), strict=True):
@@ -94,7 +94,7 @@ class Whole:
             blocks.append(block._replace(points=points))
         self.setup = self.setup._replace(blocks=tuple(blocks))
         if comm.leads:
-            totals[SINCE_START] = sum(share["work"] for share in parts)
+            totals[SINCE_START] = sum(subdomain["work"] for subdomain in parts)
             self._join(parts)
 
     def _own(self) -> dict:
@@ -116,18 +116,18 @@ class Whole:
         whole, tiles = self.setup, self.tiles
         for k, block in enumerate(whole.blocks):
             block.tiling.count[1] = 1 if tiles.direct else SHARES
-            join_tilings(block.tiling, [share["tiling"][k] for share in parts])
+            join_tilings(block.tiling, [subdomain["tiling"][k] for subdomain in parts])
         tiles.empty_nodes(whole)
         tiles.lay_out(whole)
         nodes = numbers(whole.spans)
         for _, array in of_nodes(whole):
             array[nodes] = 0  # also at nodes that no box reaches
         memory = self.subdomain.memory()
-        for share in parts:
-            for (_, array), rows in zip(of_nodes(whole), share["at nodes"], strict=True):
-                array[share["nodes"]] = rows
-            for array, rows in zip(memory, share["memory"], strict=True):
-                array[share["nodes"]] = rows
+        for subdomain in parts:
+            for (_, array), rows in zip(of_nodes(whole), subdomain["at nodes"], strict=True):
+                array[subdomain["nodes"]] = rows
+            for array, rows in zip(memory, subdomain["memory"], strict=True):
+                array[subdomain["nodes"]] = rows
 
     def _nodes(self, moved: bool) -> tuple:
         subdomain, tiles = self.subdomain, self.simulation.tiles
@@ -151,10 +151,10 @@ class Whole:
             one[nodes] = rows
 
     def _hand_back(self, nodes: np.ndarray, rows: list) -> None:
-        s, share = self.simulation.setup, self.simulation.comm.scatter(self._shares())
+        s, subdomain = self.simulation.setup, self.simulation.comm.scatter(self._shares())
         here = np.isin(nodes, numbers(s.spans))
         for (_, array), mine in zip(of_nodes(s), rows, strict=True):
             array[nodes[here]] = mine[here]
         for k, block in enumerate(s.blocks):
             for name, array in arrays_of(block.points):
-                array[...] = share[f"points/{k}/{name}"]
+                array[...] = subdomain[f"points/{k}/{name}"]

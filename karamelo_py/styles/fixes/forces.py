@@ -267,8 +267,8 @@ class ForceParticles(PointForces):
 
     def forces(self, points: PointsView) -> np.ndarray:
         mass, x = points.mass.astype(float), points.position
-        share = mass / (points.total(mass) or 1.0)
-        return share[:, None] * vector(self.force, self.hub, x, lambda: points.reference_position)
+        fraction = (mass / (points.total(mass) or 1.0))[:, None]
+        return fraction * vector(self.force, self.hub, x, lambda: points.reference_position)
 
 
 def brake(node):

@@ -23,12 +23,12 @@ def give_one_way(flux, values, dt):
     return (values[0], 1 + 0 * values[0]), flux[-1]
 
 
-def supply(given, values, dt):
+def supply(rates, values, dt):
     """Return the flux; publish minus the mass flow rate of the water that enters."""
     q, way, rho = values
-    ways = range(len(given))
-    gave = total([where(way == k, given[k], 0) for k in ways])
-    return tuple([where(way == k, rho * q, given[k]) for k in ways]), -gave
+    ways = range(len(rates))
+    gave = total([where(way == k, rates[k], 0) for k in ways])
+    return tuple([where(way == k, rho * q, rates[k]) for k in ways]), -gave
 
 
 FROM_FLUX: dict[str, Any] = {

@@ -40,7 +40,7 @@ def flows(law: NamedTuple) -> bool:
     return any(of.flows or of.any_speed for of in traits)
 
 
-def heat_shares(laws: Sequence[NamedTuple], *, conducting: bool) -> np.ndarray:
+def heat_fractions(laws: Sequence[NamedTuple], *, conducting: bool) -> np.ndarray:
     """Return the fraction (F, F) of frictional heat that goes into the first of two solids.
 
     With conduction, the fraction follows from the effusivities sqrt(kappa rho cp), as between
@@ -168,7 +168,7 @@ class ULMPMContacts(Method):
             beside=np.array([(prod(shape[k + 1 :]), shape[k]) for k in range(d)]),
             per_mass=np.array([specific_volume(law) for law in laws]) / h ** (d - 1),
             friction=np.zeros((count, count)),
-            warmth=heat_shares(laws, conducting=hub.update.thermal),
+            warmth=heat_fractions(laws, conducting=hub.update.thermal),
             pair=np.full((count, count), -1, np.int64),
             slot=slots[:, 0].copy(),
             copies=np.array(copies, np.int64).reshape(-1, 2),

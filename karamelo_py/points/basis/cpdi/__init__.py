@@ -213,9 +213,9 @@ def of_corner(stencil, c):
 def _entry_corners(basis, kin, grid, stencil, k):
     nodes = 2**kin.dimension
     corner, weight, slopes = seen_at_corner(kin, stencil, k // nodes)
-    share = hat(corner, k % nodes)
+    hat_weight = hat(corner, k % nodes)
     first, far = node_around(grid, corner, k % nodes)
-    return index(first + far), weight * share, gradient(kin, [share * g for g in slopes])
+    return index(first + far), weight * hat_weight, gradient(kin, [hat_weight * g for g in slopes])
 
 
 @bases.reach.on(ConvectedDomain)
