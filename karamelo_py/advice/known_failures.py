@@ -360,8 +360,7 @@ def _warn_about_precision(s: SceneFacts) -> None:
     """Warn if single precision cannot resolve how far points move in a step.
 
     At 50 000 cells from the origin, the path of a falling block has an error of 3.5 %. At 200 000
-    cells, the block does not move. Raises ScriptError if positions are spaced by 1/500 cell or
-    more.
+    cells, the block does not move. Raises ScriptError if positions are 1/500 cell or more apart.
     """
     if s.hub.settings.precision != "single":
         return

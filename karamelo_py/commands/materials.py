@@ -159,8 +159,7 @@ def load_path(
     turn
         Angle in radians by which the point rotates about z, in fixed axes.
     duration
-        Duration, for rate-dependent laws; default 1. With neither strains nor stresses, the
-        duration of a hold.
+        Duration, for rate-dependent laws; default 1. Without strains and stresses, a hold time.
 
     Example
     -------

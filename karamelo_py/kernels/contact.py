@@ -584,8 +584,7 @@ def _touch_pair(bodies, control, i, j, where):
     contact.touched[n, b] = -where.step if sticks else where.step
     heat = 0.0
     if rub > 0:
-        # Heat is the impulse times the mean sliding speed in the step, which includes the effect of
-        # internal forces.
+        # Heat is impulse times mean sliding speed in the step, with the effect of internal forces.
         before = _before(kin, nodes, n, pair.per_n) - _before(kin, nodes, m, pair.per_m)
         for speed, first, yielding in zip(slides, (*before, *around[2:3]), yields, strict=True):
             heat += rub * speed * 0.5 * (first + speed * (1.0 - rub * yielding))

@@ -466,8 +466,8 @@ def _change_update(members, call, c, q):
 def _change_velocity(members, call, c, q):
     kin, nodes, hooks, n = members.kin, members.nodes, call.hooks, call.hooks.chosen[q]
     hook, v, last = hooks.table[call.h], nodes.velocity[n, c], nodes.update[n, c]
-    # Strain before the forces uses the nodal velocity of the last step, so the hooks that held it
-    # then act again.
+    # Strain before the forces uses the nodal velocity of the last step: hooks that held it act
+    # again.
     strains_first = hook.stage == arrays.POST_UPDATE_GRID_STATE and hook.holds > 0
     value = hooks.scratch[BEFORE if strains_first and hook.uses_before else VALUE, q]
     # v* is from the last step

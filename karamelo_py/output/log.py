@@ -72,8 +72,7 @@ class Log(Rhythmic):
         numbers = [column.read() for column in self.columns]
         if self.rows is not None:
             self.rows.append(([column.heading for column in self.columns], numbers))
-        # A blank leaves room for a minus sign, except in the first column: pandas would add a
-        # column.
+        # A blank leaves room for a minus sign, except in the first column: pandas would add one.
         cells = [str(x) if isinstance(x, int | str) else f"{x: .10g}" for x in numbers]
         cells[0] = cells[0].lstrip()
         self._put(cells)

@@ -34,8 +34,7 @@ GROWING = 2  # consecutive windows with growth before a warning
 def unknown_work(hub: Hub) -> str:
     """Return the source of work that is not tracked, or "".
 
-    Work of compiled hooks is summed. A Python fix that does no work declares this by
-    `Fix.conserves`.
+    Work of compiled hooks is summed; a Python fix that does no work declares `Fix.conserves`.
     """
     method, implicit = hub.update.method, hub.update.scheme.traits.implicit
     apart = method.own_grids or (implicit and method.fields_per_solid)

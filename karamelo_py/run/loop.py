@@ -98,8 +98,7 @@ class RunLoop:
                 with counted("output"):
                     hub.console.end_run()
                     if self.interrupted:
-                        # Restart files come first: a longer run that reads them lacks the final
-                        # output.
+                        # Restart files come first: a longer run has no final output here.
                         hub.output.write_last()
                     hub.output.end()
                 self._agree(simulation)  # no further run starts after a signal

@@ -40,8 +40,8 @@ TILES = {1: 64, 2: 24, 3: 8}
 NODES = {1: 64, 2: 8, 3: 8}
 LONGER = 16  # in 3D with one point per cell, tiles are longer along rows, to have more points
 SHARES = 64  # sets of tiles in a block with about equal numbers of points, for threads
-# Boxes with fewer rows than this number times the nodes are allocated at the start: unused pages
-# take no memory.
+# Boxes with fewer rows than this times the nodes are allocated at the start: unused pages take no
+# memory.
 ALLOCATED_UP_TO = 8
 DIRECT_UP_TO = 2000  # points up to which clearing and summing boxes costs more than threads save
 PART = 2000  # points per part, for sorting by threads

@@ -137,8 +137,7 @@ class Solid(Named):
             volume = volume * self.domain.depth(placement.x0[:])
         else:
             volume = volume * self.domain.thickness
-        # As in `Placement`, but per radian if axisymmetric; read-only. Equal values are stored
-        # once.
+        # As in `Placement`, but per radian if axisymmetric; read-only. Equal values occur once.
         self.places = placement.x0
         self.volume0 = np.broadcast_to(volume, (count,))
         self.mass = np.broadcast_to(volume / float(specific_volume(self.material.law)), (count,))

@@ -26,8 +26,7 @@ CLOSE = (
 PUBLISHED = "iterations", "residual", "parts"
 
 
-# A larger tolerance could accept the first correction without equilibrium; smaller ones are below
-# round-off.
+# A larger tolerance could accept a first correction without equilibrium; a smaller is round-off.
 Tolerance = Constraint("from 1e-14 to 0.01", lambda value: 1e-14 <= value <= 0.01)
 
 

@@ -234,7 +234,7 @@ def histories(
 def forward(time: np.ndarray, stopped: bool) -> np.ndarray:
     """Return a mask (n,) of rows with increasing time.
 
-    A stopped run ends with an earlier good state. After a return to an earlier state, some rows are
+    A stopped run ends with an earlier good state. After a return to an earlier state, rows are
     invalid.
     """
     if stopped:

@@ -1,6 +1,6 @@
 """Laws of generalised plane strain, with a prescribed stretch F_zz across the plane.
 
-Before each step, `impose_stretch` sets the stretch at its end. The inner law has the tensors of
+Before each step, `impose_stretch` sets the final stretch. The inner law has the tensors of
 `Axisymmetric`.
 """
 

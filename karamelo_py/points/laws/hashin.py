@@ -174,8 +174,7 @@ def piola_stress(law, kin, state):
 
 @laws.advance.on(BreakingApart)
 def _advance_hashin(law, kin, state, dl, dt):
-    # Broken parts lose their stress in the next step: a load step in which the stress jumps has
-    # no equilibrium.
+    # Broken parts lose their stress in the next step: a load step with a jump has no equilibrium.
     new = state._replace(
         fibres=where(max(state.fibre_t, state.fibre_c) < 1, 1, law.residual),
         matrix=where(max(state.matrix_t, state.matrix_c) < 1, 1.0, 0.0),

@@ -83,8 +83,8 @@ class Mesh(NamedTuple):
         name = group if group in names else alike[0] if len(alike) == 1 else None
         message = f"the mesh has no physical group '{group}' with elements"
         if name is None:
-            # Gmsh numbers its groups and may name them. A number that occurs in a single dimension
-            # needs no prefix.
+            # Gmsh numbers its groups and may name them. A number of a single dimension needs no
+            # prefix.
             taken = {*names}
             once = [n for n in names if n.rpartition(":")[2] not in taken or ":" not in n]
             named = [name for name in once if not name.isdigit()] or once

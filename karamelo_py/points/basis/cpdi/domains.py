@@ -14,8 +14,8 @@ class _Parallel(cpdi.ConvectedDomain):
 class R4(_Parallel):
     """Parallelograms, given by x and two half edges, which rotate and stretch with the point.
 
-    In non-uniform strain, neighbours may slightly overlap or separate (Sadeghirad, Brannon &
-    Burghardt 2011).
+    In non-uniform strain, neighbours may overlap or separate (Sadeghirad, Brannon & Burghardt
+    2011).
 
     Example
     -------
