@@ -38,7 +38,7 @@ def compare(run, axes, full):
         here, there = loads(space, press), loads(flat, press)
         yield Row(f"load at {press:.0%} (kN)", there, here, 0.03, SOURCE)
     for press in (0.2, 0.4):
-        name = f"load at {press:.0%} divided by a cylinder's"
+        name = f"load at {press:.0%} / load of a frictionless cylinder"
         ratio = loads(flat, press) / uniform(press)
         yield Row(name, (1, sticking(press)), ratio, 0.01, "limit analysis (Siebel 1923)")
     yield Row("largest radius at 60 % (mm)", flat.radius[-1], space.radius[-1], 0.03, SOURCE)

@@ -44,7 +44,13 @@ def compare(run, axes, full):
     yield Row("largest plastic strain", flat.worst_Epmax[-1], solid.worst_Epmax[-1], 0.1, SOURCE)
     rise = flat.flat_Tmax[-1] - 298
     yield Row("largest rise of temperature (K)", rise, solid.flat_Tmax[-1] - 298, 0.1, SOURCE)
-    yield Row("top above the block (um)", flat.height[-1], solid.height[-1], 0.05, SOURCE)
+    yield Row(
+        "height of the top of the ball above the block (um)",
+        flat.height[-1],
+        solid.height[-1],
+        0.05,
+        SOURCE,
+    )
     yield Row("plastic work (nJ)", flat.spent[-1], solid.spent[-1], 0.05, SOURCE)
     for log, what in ((flat, "axisymmetric"), (solid, "in 3D")):
         # The transfer loses a hundredth of what differs between points and grid in each step.

@@ -1,4 +1,4 @@
-"""Column under its own weight: how the stress converges, by CPDI."""
+"""Column under its own weight: convergence of the stress with CPDI."""
 
 import numpy as np
 

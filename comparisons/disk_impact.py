@@ -1,4 +1,4 @@
-"""Steel disk into aluminium, 1160 m/s, plane strain: path of the disk as in a published program."""
+"""Steel disk into aluminium, 1160 m/s, plane strain: its path against a published program."""
 
 from math import sqrt
 from pathlib import Path

@@ -27,7 +27,13 @@ def compare(run, axes, full):
     stiff = run(E=1e9, calm=0.8, T=0.12).log
     rest = stiff.ux[stiff.Time > 0.096].mean()
     # Two cells across its thickness are too stiff.
-    yield Row("end of a stiff gate (mm)", beam(1e9), rest, 0.12, "Euler & Bernoulli, Timoshenko")
+    yield Row(
+        "deflection of the end of a stiff gate (mm)",
+        beam(1e9),
+        rest,
+        0.12,
+        "Euler & Bernoulli, Timoshenko",
+    )
     result = run()
     log = result.log
     most = log.ux.argmax()
@@ -37,7 +43,11 @@ def compare(run, axes, full):
     even = np.interp(log.ux[most] / 1e3 / LENGTH, (1 - np.cos(angles)) / angles, angles)
     round_ = 1000 * LENGTH * (1 - np.sin(even) / even)
     yield Row(
-        "rise of its end at the widest opening (mm)", round_, rise, 0.25, "circle of its length"
+        "rise of the gate's end at the widest opening (mm)",
+        round_,
+        rise,
+        0.25,
+        "circle of its length",
     )
     last = result.snapshots("elastic_gate")
     water = [s.mass[(s.type == 1) & (s.x < 0.1)].sum() / RHO for s in last]

@@ -21,4 +21,10 @@ def compare(run, axes, full):
     axes.set(ylabel="relative error of the tip displacement")
     for name, points in found.items():
         source = "Bisshopp & Drucker 1945"
-        yield Row(f"error of the longer run, {name}", 0.0, points[-1][1], 0.015, source)
+        yield Row(
+            f"error of the tip displacement in the costlier run, {name}",
+            0.0,
+            points[-1][1],
+            0.015,
+            source,
+        )

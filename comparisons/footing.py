@@ -1,4 +1,4 @@
-"""Rigid strip that is pressed into clay: the load when it yields, against Prandtl."""
+"""Rigid strip pressed into clay: limit load against Prandtl's."""
 
 from math import radians
 
@@ -20,7 +20,7 @@ def compare(run, axes, full):
         log = run(**words).log
         late = (log.Time > 0.7) & (log.Time < 0.99)
         source = "locks" if "bar" in words else "Prandtl 1920 (exact)"
-        yield Row(f"load / c, {name}", load, log.load[late].mean(), within, source)
+        yield Row(f"load / cohesion, {name}", load, log.load[late].mean(), within, source)
         (line,) = axes.plot(log.Time, log.load, lw=1.2, label=name)
         if "bar" not in words:
             axes.axhline(load, color=line.get_color(), lw=0.9, ls=":", label=f"exact, {name}")

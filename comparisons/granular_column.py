@@ -1,4 +1,4 @@
-"""Collapse of a column of sand on a rough floor: how far it runs out, by its aspect ratio."""
+"""Collapse of a sand column on a rough floor: run-out against aspect ratio."""
 
 from comparisons.exact import granular_runout
 from comparisons.lines import surface

@@ -23,7 +23,7 @@ def compare(run, axes, full):
     axes.set(xlabel="depth (mm)", ylabel="temperature (K)")
     error = sqrt(np.mean((points["T"] - exact) ** 2)) / RISE
     # Second order in the cell: 0.0016 with 20 cells.
-    yield Row("error of T / rise, rms", 0.0, error, 2e-4 if full else 3e-3, SOURCE)
+    yield Row("rms error of the temperature / its rise", 0.0, error, 2e-4 if full else 3e-3, SOURCE)
     flux = KAPPA * RISE / sqrt(pi * KAPPA / CAPACITY * points["TIME"])
     yield Row("heat flux (W/m2)", flux, result.log.face_s[-1], 0.01, SOURCE)
     log = result.log

@@ -58,9 +58,9 @@ def compare(run, axes, full):
             within = CUT[cells] if rim == "cut" else R / cells / ppc / 4 / APPROACH
             yield Row(f"force, {of} (kN/m)", LOAD / 1000, force / 1000, within, HERTZ)
             # Of first order: some cells below the contact err, whatever their size.
-            quantity = "stress, rms error / largest stress"
+            quantity = "rms error of the stress / largest stress"
             yield Row(f"{quantity}, {of}", 0.0, errors[-1], 6 / cells, HERTZ)
-            yield Row(f"{quantity}, below 0.7 half widths, {of}", 0.0, error(last, 0.7),
+            yield Row(f"{quantity}, deeper than 0.7 half widths, {of}", 0.0, error(last, 0.7),
                       4 / cells, HERTZ)  # fmt: skip
         label = f"{basis}, {ppc} x {ppc}, {rim}, {cells} cells"
         x, stress = beside(last, R / cells)

@@ -31,7 +31,13 @@ def compare(run, axes, full):
         log = run(**words).log
         late = log.Time > 0.2
         found = np.polyfit(log.Time[late], log.v_x[late], 1)[0]
-        yield Row(f"acceleration, {name} (m/s2)", expected, found, within, "rigid disk (exact)")
+        yield Row(
+            f"acceleration of a disk that {name} (m/s2)",
+            expected,
+            found,
+            within,
+            "rigid disk (exact)",
+        )
         if "splines" not in name:  # their lines would lie on those of the linear basis
             axes.plot(log.Time, log.v_x, lw=1.2, label=name)
         exact.add(expected)

@@ -1,4 +1,4 @@
-"""Thick cylinder widened from inside: pressure, displacement and stress by Lame."""
+"""Thick cylinder widened from inside: pressure, displacement and stress against Lame's solution."""
 
 import numpy as np
 

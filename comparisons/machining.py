@@ -1,4 +1,4 @@
-"""Tool that cuts steel at 50 m/s: force of the cut against Merchant's, energy, chip."""
+"""Steel cut at 50 m/s: cutting force against Merchant's formula, energy, chip."""
 
 from math import atan, cos, pi, sin, sqrt
 

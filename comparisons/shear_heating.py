@@ -1,4 +1,4 @@
-"""Adiabatic heating of a sheared block: temperature by the plastic work, in closed form."""
+"""Adiabatic heating of a sheared block: temperature against the closed form."""
 
 from math import sqrt
 
@@ -35,7 +35,13 @@ def compare(run, axes, full):
             f"heating at a shear of {gamma:g} (K)", temperature - T0, mean - T0, 0.005, source
         )
     # Shear is the same everywhere: so is the temperature.
-    yield Row("hottest point (K)", temperature - T0, log.worst_Tmax[-1] - T0, 0.005, source)
+    yield Row(
+        "temperature rise of the hottest point (K)",
+        temperature - T0,
+        log.worst_Tmax[-1] - T0,
+        0.005,
+        source,
+    )
     yield Row("plastic strain", ep, log.worst_Epmax[-1], 0.005, source)
     yield Row("dissipated energy (J)", work * L**2, log.lost[-1], 0.005, source)
     axes.plot(log.sheared, solution(log.sheared)[2], "k-", lw=0.8, label=source)

@@ -31,9 +31,15 @@ SMALL = {
 def compare(run, axes, full):
     """Toe, surface, slip surface, and whether that is round."""
     last = run().snapshots("slump")[-1]
-    yield Row("area (m2)", AREA, last.mass.sum() / RHO, 0.005, "Wyser et al. 2020")
+    yield Row("area of the section (m2)", AREA, last.mass.sum() / RHO, 0.005, "Wyser et al. 2020")
     slid = last.y > GROUND + 0.6
-    yield Row("toe (m)", SURFACE[:, 0][SURFACE[:, 1] > 16][-1], last.x[slid].max(), 0.05, SOURCE)
+    yield Row(
+        "position of the toe (m)",
+        SURFACE[:, 0][SURFACE[:, 1] > 16][-1],
+        last.x[slid].max(),
+        0.05,
+        SOURCE,
+    )
     # The digitised surface has some 60 m2 more below it than the slope had at first.
     top = surface(last, RHO, 1.0)
     hill = SURFACE[SURFACE[:, 1] > 16]

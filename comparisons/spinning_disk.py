@@ -19,7 +19,7 @@ def compare(run, axes, full):
         log = run(transfer=transfer, alpha=alpha).log
         # A staircase of points is heavier than the disk by 1 to 2 %, and the gradients that APIC's
         # points carry are a spin of their own, of about (h/R)^2 = 1 %.
-        yield Row(f"angular momentum, {transfer}", pi / 2, log.Lz_z[0], 0.04, "exact")
+        yield Row(f"initial angular momentum, {transfer}", pi / 2, log.Lz_z[0], 0.04, "exact")
         kept = log.Lz_z[-1] / log.Lz_z[0]
         source = "exact" if transfer == "APIC" else "bounds"
         yield Row(f"final / initial angular momentum, {transfer}", momentum, kept, within, source)

@@ -30,5 +30,9 @@ def compare(run, axes, full):
     axes.set(ylabel="relative error of the load")
     for name, points in found.items():
         yield Row(
-            f"error on 20 x 20 cells, {name}", 0.0, points[-1][1], 0.05, "Prandtl 1920 (exact)"
+            f"error of the limit load on 20 x 20 cells, {name}",
+            0.0,
+            points[-1][1],
+            0.05,
+            "Prandtl 1920 (exact)",
         )

@@ -19,7 +19,13 @@ def compare(run, axes, full):
     yield Row("kinetic energy at the start (J)", ENERGY, log.E_kinetic[0], 2e-3, SOURCE)
     # What is missing is lost by the transfer, FLIP 0.99.
     spent = log.E_dissipated[-1] / ENERGY
-    yield Row("fraction spent on plastic flow", 1.0, spent, 0.03, "no elastic vibration left")
+    yield Row(
+        "fraction of the energy spent on plastic flow",
+        1.0,
+        spent,
+        0.03,
+        "no elastic vibration left",
+    )
     last = result.snapshots("taylor_bar_227")[-1]
     coloured(axes, 1e3 * last.x, 1e3 * last.y, last.ep, "plastic strain", bar=0.08)
     axes.axhspan(*LENGTH, color="k", alpha=0.3, label="length, finite elements")

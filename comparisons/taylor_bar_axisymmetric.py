@@ -46,7 +46,7 @@ def compare(run, axes, full):
             run(kind="tlmpm", refine=1 / 3, average=average).log.diameter[-1]
             for average in ("true", "false")
         )
-        name = "foot with 5 cells, without / with F-bar"
+        name = "diameter of the foot with 5 cells, without / with F-bar"
         yield Row(name, (0.5, 0.9), locked / free, 0.0, "locking")
     axes.plot([DIAMETER / 2, 0], [0, LENGTH], "k+", ms=12, label="experiment")
     axes.set(xlabel="radius (mm)", ylabel="height (mm)", aspect="equal", xlim=(-9, 9))

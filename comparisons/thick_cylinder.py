@@ -22,7 +22,9 @@ def compare(run, axes, full):
         axes.plot(result.log.Time / 30 * 4, pressure, label=f"{cells} cells")
         if refine == 1:
             share = pressure[1] / (E / (1 + NU) * 4 / 30 / E / ((1 - 2 * NU) + 4) * 3)
-            yield Row("first step / elastic solution", 1.0, share, 0.002, "Lame 1852")
+            yield Row(
+                "pressure after the first step / elastic solution", 1.0, share, 0.002, "Lame 1852"
+            )
             last = result.snapshots("cylinder")[-1]
             # Sums over the points of a cell: inside one the strain of linear functions is constant.
             order = np.argsort(last.x)
