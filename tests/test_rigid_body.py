@@ -333,6 +333,38 @@ def test_the_area_of_contact(run_interpreted):
     assert log.f_area[-1] == log.f_y[-1] == 0
 
 
+DRAGGED = """
+method(ulmpm, FLIP, linear, 1)
+dimension({d}, {box}, 1)
+region(plate, {plate})
+region(block, {block})
+material(steel, rigid, 6)
+material(soft, linear, 1, 100, 0.3)
+solid(block, region, block, {ppc}, soft, 1)
+solid(plate, region, plate, 1, steel, 1)
+fix(weight, body_force, all{weight})
+fix(b, rigid_body, plate, motion=({motion}), turning={turning})
+fix(f, contact/rigid_body, all, plate, 10, limit=0.1)
+set_dt(0.02)
+set_output(3)
+log_modify(custom, step, f_x, f_y, f_area)
+run(9)
+"""
+
+
+@pytest.mark.parametrize(("d", "ppc"), [(2, 2), (3, 1)])
+def test_friction_with_a_limit_acts_on_the_whole_area(run_interpreted, d, ppc):
+    """The stress times the area, even where the points do not touch all the time."""
+    given = {"box": ", ".join(["0, 6"] * d)}
+    given["plate"] = "block, 1, 5, 1, 2" + ", 1, 5" * (d - 2)
+    given["block"] = "block, 2, 4, 2, 3" + ", 2, 4" * (d - 2)
+    given["motion"], given["weight"] = "0.5, 0" + ", 0" * (d - 2), ", 0, -1" + ", 0" * (d - 2)
+    given["turning"] = "0" if d == 2 else "(0, 0, 0)"
+    log = run_interpreted(DRAGGED.format(d=d, ppc=ppc, **given)).log
+    assert log.f_x[1:] == pytest.approx(np.full(3, 0.1 * 2 ** (d - 1)), rel=0.01)  # it strains
+    assert log.f_y[1:].mean() > 0.5 * 2 ** (d - 1)
+
+
 @pytest.mark.parametrize(("method", "touch"), [("ulmpm/contacts", GRID), ("tlmpm", POINTS)])
 def test_a_restarted_run_has_the_same_bits(run_interpreted, method, touch):
     text = HIT.format(method=method, touch=touch, ratio=1).replace("run(20)", "run(10)")

@@ -1,6 +1,6 @@
 """Contact of freely moving rigid bodies, and the rows that they add to a step."""
 
-from math import sqrt
+from math import inf, sqrt
 from typing import NamedTuple
 
 import numpy as np
@@ -40,6 +40,7 @@ class TouchingSurface(NamedTuple):
     clear: np.ndarray
     grip: np.ndarray  # (N, GRIP) by id; (0, GRIP) without friction
     mu: float
+    limit: float  # largest frictional stress
     slot: int  # slot of the force on points
     torque: int  # slot of the torque, or 0
     area: int  # slot of the area of contact
@@ -121,6 +122,8 @@ def _list_point(body, surface, s, block, p):
     volume = volume_of(kin, points, law, material, p)
     ball = radius(kin, volume, x)
     close = min(move, h) + ball
+    if surface.limit < inf:
+        close = max(close, 2 * ball)
     clear = surface.clear[number]
     clear[0] -= move
     if clear[0] > close:
@@ -149,11 +152,12 @@ def _list_point(body, surface, s, block, p):
         n, weight, _ = entry(s.basis, kin, grid, stencil, node)
         for c in range(d):
             contact.v[c] += weight * s.nodes.update[n, c]
-    contact.gap, contact.mass, contact.mu = -within - ball, points.mass[p], surface.mu
+    contact.gap, contact.reach = -within - ball, ball
+    contact.mass, contact.mu = points.mass[p], surface.mu
     deep = max((within + ball) / (DEEP * h), 1.0)
     fraction = SOFT * dt * times.kick / (times.contact_dt * times.contact_kick)
     contact.share = min(deep * deep * fraction, 1.0)
-    contact.most, contact.face = 0.0, face(kin, volume, x)
+    contact.most, contact.face, contact.limit = 0.0, face(kin, volume, x), inf
     contact.number = number
     for c in range(3):
         contact.local[c] = local[c]
@@ -187,7 +191,7 @@ def _retain(grip, control, contact):
         return
     memory, kick = grip[contact.number], control.step[0].kick
     mean = contact.usual + NEW * (contact.push - contact.usual)
-    bound, square = contact.mu * max(mean, contact.push), 0.0
+    bound, square = min(contact.mu * max(mean, contact.push), contact.limit), 0.0
     for c in range(3):
         memory[c], memory[6 + c] = contact.mass / kick * contact.hold[c], contact.local[c]
         square += memory[c] ** 2
@@ -210,6 +214,22 @@ def _list_points(body, surface, s, block, number):
             contact.block, contact.point, contact.slot = number, p, surface.slot
             contact.torque, contact.area = surface.torque, surface.area
             body.count[0] += 1
+
+
+@noinline
+def _limit_friction(body, surface, kick, first):
+    """Distribute the area of the surface over the points that touch it.
+
+    A layer one point thick has the area of the surface, but some of its points do not touch.
+    """
+    layer = pressed = 0.0
+    for i in range(first, body.count[0]):
+        contact = body.contacts[i]
+        layer += contact.face if contact.gap < contact.reach else 0.0
+        pressed += contact.face if contact.gap < 0 else 0.0
+    for i in range(first, body.count[0] if pressed > 0 else first):
+        contact = body.contacts[i]
+        contact.limit = kick * surface.limit * contact.face * layer / pressed
 
 
 @noinline
@@ -311,7 +331,7 @@ def _list_nodes(body, s):
         closing = closing_part(Bodies(contact, s.kin, nodes), (n, m), x, s.grids.h[0])
         one.gap = (closing if lasts else 1.0) * max(body.pairs.gaps[q], 0.0)
         one.mass, one.mu, one.share = nodes.sums[m, arrays.MASS], contact.friction[a, b], 1.0
-        one.most = one.usual = one.spare = 0.0
+        one.most, one.usual, one.spare, one.limit = 0.0, 0.0, 0.0, inf
         one.hold[:] = 0.0
         body.count[0] += 1
 
@@ -364,8 +384,10 @@ def _list_contacts(body, s):
             s.control.values[surface.slot + c] = 0.0
         for c in range(3 if surface.torque else 0):
             s.control.values[surface.torque + c] = 0.0
+        first = body.count[0]
         for number, block in enumerate(s.blocks):
             _list_points(body, surface, s, block, number)
+        _limit_friction(body, surface, s.control.step[0].kick, first)
     if isinstance(s.contact, SeparateFields):
         _lead_nodes(body, s)
         _list_nodes(body, s)

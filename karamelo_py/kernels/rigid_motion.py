@@ -56,6 +56,7 @@ CONTACT = np.dtype([
     ("at", *_VECTOR), ("normal", *_VECTOR), ("gap", *_NUMBER),
     ("mass", *_NUMBER), ("v", *_VECTOR),  # mass and velocity of the other body
     ("mu", *_NUMBER), ("share", *_NUMBER),  # fraction s of the approach removed
+    ("limit", *_NUMBER), ("reach", *_NUMBER),  # largest friction; radius of a point
     ("hold", *_VECTOR), ("local", *_VECTOR),  # h; position in the body's initial frame
     ("usual", *_NUMBER), ("spare", *_NUMBER),  # mean impulse; friction not used in earlier steps
     ("impulse", *_VECTOR),
@@ -272,7 +273,8 @@ def velocity_there(body, u, k):
 def _bound(c):
     """Return the largest friction impulse, and its derivative by the normal impulse."""
     usual, spare = c.mu * max(c.usual, c.push), c.spare + c.mu * c.push
-    return min(usual, spare), c.mu if spare < usual or c.push > c.usual else 0.0
+    bound = min(usual, spare, c.limit)
+    return bound, c.mu if bound < c.limit and (spare < usual or c.push > c.usual) else 0.0
 
 
 @noinline

@@ -62,6 +62,7 @@ def _body(hub: Hub, fix: RigidBody, nodes: int) -> motion.FreeBody:
             np.zeros((count, 2)),
             touch.grip_of(count),
             float(touch.mu),
+            float(touch.limit),
             hub.values.slot(f"{touch.id}_x"),
             int(hub.values.torques[hub.values.slot(f"{touch.id}_x")]),
             hub.values.slot(f"{touch.id}_area"),

@@ -1,6 +1,7 @@
 """Rigid bodies, and their contact with points."""
 
 from collections.abc import Sequence
+from math import inf
 from typing import Annotated, Any
 
 import numpy as np
@@ -441,12 +442,15 @@ class ContactRigidBody(Fix):
         ID of the rigid solid, which must have a fix rigid_body.
     mu
         Coefficient of friction (Coulomb).
+    limit
+        Largest frictional stress, such as the strength of clay on a rough surface; default: none.
     region
         Surface of the body at the start; default: the region that the solid fills.
 
     Example
     -------
     fix(touch, contact/rigid_body, all, wheel, 0.4)
+    fix(touch, contact/rigid_body, all, bar, 1, limit=1e4)
 
     Notes
     -----
@@ -458,7 +462,10 @@ class ContactRigidBody(Fix):
     impulse of a spring of stiffness 0.1 m/dt^2, computed implicitly with the velocity of the body
     at the end of the step; the spring hardens above a penetration of 1/8 of a cell. Friction stops
     the slip, with at most mu times the normal impulse, and the slip stretches a spring of the same
-    stiffness, so that points under load do not creep. Nodes held by fix velocity_nodes are not
+    stiffness, so that points under load do not creep. With `limit`, friction is also at most this
+    stress times the area of a point. As some points of the outermost layer do not touch, the areas
+    of the others are scaled to the area of this layer. Without `limit`, cohesive soil that sticks
+    to the body shears 0.6 cells outside of its surface. Nodes held by fix velocity_nodes are not
     moved.
 
     The fix is for ulmpm and tlmpm. A wheel rolls on its radius plus half a point, so its
@@ -483,11 +490,13 @@ class ContactRigidBody(Fix):
         solid: Solid,
         mu: Annotated[float, NonNegative] = 0.0,
         *,
+        limit: Annotated[float, Positive] | None = None,
         region: Region | None = None,
     ):
         super().__init__(hub, group)
         judge_friction(hub, mu)
         self.mu, self.touches, surface = mu, solid, region or solid.region
+        self.limit = inf if limit is None else limit
         self.grip = np.zeros((0, GRIP))
         if group.touches(solid) and not group.all:
             message = f"the group has points of the body '{solid.id}'"
