@@ -159,7 +159,7 @@ class GivenFlux(StepField):
     shape = numbers(2, 2)
 
 
-POINT_FIELDS = RelativeVelocity, VolumeStrain, VolumeCorrection, WorkOfForces
+POINT_FIELDS = RelativeVelocity, WorkOfForces, VolumeStrain, VolumeCorrection
 NODE_FIELDS = (
     WaterSums, WaterAgain, WaterUpdate, Flux, GivenPressure, WorkAtNodes,
 )  # fmt: skip

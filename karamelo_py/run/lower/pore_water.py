@@ -6,6 +6,7 @@ import numpy as np
 
 from karamelo_py.kernels import pore_water as rows
 from karamelo_py.language.rules import FLAT, HATS_AND_SPLINES, Restrictions
+from karamelo_py.points.basis.linear import Linear
 from karamelo_py.points.kinematics import Space
 from karamelo_py.points.laws import initial_state, specific_volume, wave_speed_squared
 from karamelo_py.points.laws.pore_water import ConstantPermeability, KozenyCarman, Saturated
@@ -27,7 +28,7 @@ RESTRICTIONS = Restrictions(
 
 class PoreWater(NamedTuple):
     tag, tag_in_load_steps, tag_of_solution = rows.Water(), rows.SlowWater(), rows.SolvedWater()
-    point_fields, node_fields = rows.Water.point_fields, rows.Water.node_fields
+    node_fields = rows.Water.node_fields
 
     n: float
     drag: float
@@ -36,6 +37,12 @@ class PoreWater(NamedTuple):
     permeability: ConstantPermeability | KozenyCarman
     suction: float
     update: Update
+
+    @property
+    def point_fields(self) -> tuple[type, ...]:
+        method = self.update.method
+        linear = method is not None and isinstance(method.basis, Linear)
+        return rows.Water.point_fields[: 2 if linear else None]
 
     @property
     def words(self) -> str:
