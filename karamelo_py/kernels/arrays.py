@@ -201,6 +201,7 @@ HOOK = np.dtype([
     ("holds", np.int64),  # sets or bounds the velocity
     ("uses_place", np.int64),  # formulas depend on position
     ("totals", np.int64),  # numbers published by a hook on whole points
+    ("accelerates", np.int64),  # also acts on pore water
 ])  # fmt: skip
 PROGRAM = np.dtype([
     ("begin", np.int64),  # range of code; begin is -1 for NULL
@@ -259,9 +260,8 @@ POST_HEAT_TO_GRID = 7
 SUPPLY_HEAT = 8
 POST_UPDATE_GRID_HEAT = 9
 POST_CONTACT = 10  # damping, also of contact forces
-POST_WATER_TO_GRID = 11  # accelerations of nodes, for pore water
-POST_UPDATE_GRID_ROTATION = 12
-POST_ROTATION_TO_GRID = 13
+POST_UPDATE_GRID_ROTATION = 11
+POST_ROTATION_TO_GRID = 12
 
 # Node array that a hook changes.
 ON_SUMS, ON_UPDATE, ON_VELOCITY = 0, 1, 2

@@ -19,6 +19,7 @@ from karamelo_py.kernels.clock import kick, step_size
 from karamelo_py.kernels.equations import RigidSums
 from karamelo_py.kernels.equations.internal_force import Force
 from karamelo_py.kernels.equations.loss import FrictionalHeat
+from karamelo_py.kernels.equations.pore_water import WaterSums
 from karamelo_py.kernels.views import state_at
 from karamelo_py.kernels.walls import FRICTION, rub, stick
 from karamelo_py.points.basis import placed
@@ -62,6 +63,7 @@ class HookedNodes(NamedTuple):
     kept: float  # FLIP coefficient
     tag: NamedTuple = ()  # type: ignore[assignment]
     before_update: bool = False
+    water: np.ndarray = ()  # type: ignore[assignment]  # nodal sums of pore water, or of all
 
 
 class WholeNodes(HookedNodes):
@@ -417,7 +419,15 @@ def _called(call, state, force, values):
 @noinline
 def _change_force(members, call, c, q):
     """Change the force on a node; return the total. Work is summed in `_work_at_nodes`."""
-    kin, sums, hooks, n = members.kin, members.nodes.sums, call.hooks, call.hooks.chosen[q]
+    hooks, water = call.hooks, members.water
+    total = _push(members, call, members.nodes.sums, c, q)
+    if hooks.table[call.h].accelerates and water[hooks.chosen[q], arrays.MASS] > 0:
+        _push(members, call, water, c, q)
+    return total
+
+
+def _push(members, call, sums, c, q):
+    kin, hooks, n = members.kin, call.hooks, call.hooks.chosen[q]
     mass, values = sums[n, arrays.MASS], (hooks.scratch[VALUE, q], hooks.scratch[BEFORE, q])
     v, old = sums[n, arrays.of_momentum(kin) + c] / mass, sums[n, arrays.of_force(kin) + c]
     _, _, force, total = _called(call, (mass, v, v), old, values)
@@ -562,7 +572,9 @@ def hooked_nodes(s, target, kept):
     nodes = s.nodes  # with the fields that the loop uses; for others it would be compiled again
     fields = tuple([one for one in nodes.fields if type(one) in (FrictionalHeat, RigidSums)])
     trimmed = arrays.Nodes(nodes.sums, nodes.update, nodes.velocity, fields)
-    return HookedNodes(target, planar(s.kin), s.grids, trimmed, s.ranges, kept)
+    water = field(s.nodes.fields, WaterSums)
+    water = s.nodes.sums if water is None else water
+    return HookedNodes(target, planar(s.kin), s.grids, trimmed, s.ranges, kept, water=water)
 
 
 def whole_nodes(s, tag, stage, target):

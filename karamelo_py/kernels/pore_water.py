@@ -2,7 +2,6 @@
 
 from typing import NamedTuple
 
-from karamelo_py.compiler.fields import field
 from karamelo_py.kernels import arrays
 from karamelo_py.kernels.equations import pore_pressure as pressures
 from karamelo_py.kernels.equations import pore_water as pores
@@ -15,14 +14,6 @@ from karamelo_py.kernels.export import imposing
 from karamelo_py.kernels.table import Added, AtNodes, BeforeLoads, NodeTask, Once, scene_additions
 from karamelo_py.points.basis.linear import Linear
 from karamelo_py.points.laws.pore_water import with_pore_pressure
-
-
-def _of_water(s):
-    sums = field(s.nodes.fields, pores.WaterSums)
-    return arrays.with_items(s, nodes=arrays.with_items(s.nodes, sums=sums))
-
-
-AT_WATER = AtNodes(arrays.POST_WATER_TO_GRID, arrays.ON_SUMS, _of_water)
 
 
 def _rim(s):
@@ -43,7 +34,7 @@ def make_flux(s):
 
 
 OF_MASS = Added(instead=pores.MixtureMomentum(), then=(pores.WaterMomentum(),))
-OF_FORCE = pores.Drag(), pores.PoreVolumes(), pores.UnseenStrain(), pores.WaterForce()
+OF_FORCE = pores.Drag(), pores.UnseenStrain(), pores.PoreVolumes(), pores.WaterForce()
 BEFORE_LOADS = Added(before=(NodeTask(pores.SplitMomentum()),))
 OF_MOVE = Added(before=(NodeTask(pores.DragWater(pores.Mapped())),), then=(pores.MoveWater(),))
 OF_MOVE_OF_STEP = OF_MOVE._replace(before=(NodeTask(pores.DragWater(pores.OfStep())),))
@@ -55,7 +46,7 @@ ADDITIONS = (
         MomentumAgain,
         Added(instead=pores.MixtureMomentumAgain(), then=(pores.WaterMomentumAgain(),)),
     ),
-    (NodalUpdate, Added(before=(AT_WATER, NodeTask(pores.ShareForces, make=share_forces)))),
+    (NodalUpdate, Added(before=(NodeTask(pores.ShareForces, make=share_forces),))),
     (Move, OF_MOVE),
     (Strain, Added(before=(NodeTask(pores.MakeFlux, make=make_flux),), first=(pores.Seep(),))),
 )
@@ -88,7 +79,6 @@ def _make_flux_of_step(s):
 
 # Nodal velocities that fixes hold are known before the pressure is solved for.
 SOLVE = (
-    AT_WATER,
     NodeTask(pressures.ForgetVelocity()),
     AtNodes(arrays.POST_VELOCITIES_TO_GRID, arrays.ON_VELOCITY),
     NodeTask(pressures.Foresee, make=_foresee),

@@ -6,7 +6,7 @@ Moments, affine sums and domain corners are computed for all nodes of a stencil 
 from karamelo_py.compiler import all_lanes, point_function, real
 from karamelo_py.compiler.fields import field
 from karamelo_py.kernels import equations as eq
-from karamelo_py.kernels.arrays import Tag, of_force, with_items
+from karamelo_py.kernels.arrays import Tag, with_items
 from karamelo_py.kernels.equations.loss import EnergyLoss
 from karamelo_py.kernels.equations.move import Move
 from karamelo_py.kernels.lanes import OneByOne
@@ -23,22 +23,27 @@ from karamelo_py.points.kinematics import from_columns
 # instead of per node, which halves the work of a scatter in 2D, and saves 33 % in 3D.
 
 
-def _beside(a, b):
-    """Concatenate `a`, padded with zeros to four components, and `b`."""
-    return (*a, *((a[0] - a[0],) * (4 - len(a))), *b)
+def _beside(a, gap, b):
+    return (*a, *[real(0, a[0])] * gap, *b)
 
 
-def joined(lanes, kin, parts):
-    """Join momentum and force in one part, if both have increments and fit into a register."""
-    if isinstance(lanes, OneByOne) or len(parts) != 2 or of_force(kin) != 4:
+def joined(lanes, parts):
+    """Join parts of one array, with zeros in up to three columns between them."""
+    if isinstance(lanes, OneByOne):
         return parts
-    array, first, weighted, a, to_a = parts[0]
-    *_, b, to_b = parts[1]
-    of_sums = len(a) == 1 + kin.dimension and len(b) == kin.dimension
-    if not (of_sums and len(to_a) and len(to_b)):
-        return parts
-    growths = [_beside(x, y) for x, y in zip(to_a, to_b, strict=True)]
-    return ((array, first, weighted, _beside(a, b), tuple(growths)),)
+    done, last = [], {}
+    for array, first, weighted, value, growths in parts:
+        alike = array, weighted, len(growths)
+        if alike in last:
+            _, begin, _, before, ways = last[alike]
+            gap = first - begin - len(before)
+            if 0 <= gap <= 3:
+                first, value = begin, _beside(before, gap, value)
+                growths = tuple([_beside(a, gap, b) for a, b in zip(ways, growths, strict=True)])
+            else:
+                done = [*done, last[alike]]
+        last[alike] = array, first, weighted, value, growths
+    return [*done, *last.values()]
 
 
 def give_affine(lanes, w, stencil, parts):
@@ -46,10 +51,12 @@ def give_affine(lanes, w, stencil, parts):
     nodes, weights = tuple([node.i for node in seen]), tuple([node.N for node in seen])
     some = [
         (weighted, (array, first, (*value,), tuple([(*growth,) for growth in growths])))
-        for array, first, weighted, value, growths in joined(lanes, w.kin, parts)
+        for array, first, weighted, value, growths in joined(lanes, parts)
     ]
-    accumulate_affine(tuple([part for weighted, part in some if weighted]), nodes, weights)
-    accumulate_affine(tuple([part for weighted, part in some if not weighted]), nodes, ())
+    for factors in weights, ():
+        alike = [part for weighted, part in some if weighted == (len(factors) > 0)]
+        with_arrays = [(eq.node_array(w.nodes, name), *part) for name, *part in alike]
+        accumulate_affine(tuple(with_arrays), nodes, factors)
 
 
 def gathered_by_arms(w):

@@ -185,7 +185,7 @@ def _register(kind: Any) -> None:
             return ()
         weighted = not isinstance(parts[0], Unweighted)
         at_first = [_at_first(w, stencil, *term) if weighted else term for term in parts]
-        return node_array(w.nodes, array), sums[0].into.first(w.kin), weighted, *_joined(at_first)
+        return array, sums[0].into.first(w.kin), weighted, *_joined(at_first)
 
 
 class ExtensiveQuantity(NodalQuantity):

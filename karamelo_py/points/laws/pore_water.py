@@ -64,8 +64,8 @@ def _advance_in_run(law, kin, state, step):
 
 laws.wraps(
     Saturated, "law", "skeleton", (
-        laws.deformation, laws.jacobian, laws.kirchhoff_stress, laws.cauchy_stress, laws.elastic_strain,
-        laws.dissipated_energy, laws.damage, laws.damage_initiation,
+        laws.deformation, laws.jacobian, laws.kirchhoff_stress, laws.cauchy_stress,
+        laws.elastic_strain, laws.dissipated_energy, laws.damage, laws.damage_initiation,
         laws.plastic_strain, laws.specific_volume, laws.shear_part, laws.by_rates, laws.with_stress,
     ),
 )  # fmt: skip

@@ -116,7 +116,7 @@ class _Builder:
         self.rigid_fields = method.rigid_fields(hub) if method is not None else np.zeros(0, bool)
         self.rigid = any(solid.rigid for solid in hub.solids.values())
         self.whole: list[Tag] = []  # hooks that treat all directions of a point at once
-        self.wet = is_wet(hub)
+        self.wet = is_wet(hub) and not hub.update.scheme.traits.implicit
 
     def add(self, fix: Fix, moment: str, hook: CompiledHook) -> None:
         begin, end = self._members(fix, hook)
@@ -135,7 +135,8 @@ class _Builder:
         turns = bool(self.hub.values.torques.any())
         uses_place = turns or any(f.names & set(POINT_SEEDS) for f in formulas)
         count = len(fix.published) if slot >= 0 and hook.tag is not None else 0
-        uses = [*map(int, (hook.uses_before, hook.uses_share, holds, uses_place, count))]
+        wet = fix.accelerates and self.wet
+        uses = [*map(int, (hook.uses_before, hook.uses_share, holds, uses_place, count, wet))]
         late = STAGES[moment] == arrays.POST_UPDATE_GRID_STATE
         apart = self.hub.update.method.fields_per_solid or moved(self.hub)
         after_contact = late and fix.brakes and apart
@@ -146,9 +147,6 @@ class _Builder:
         programs = list(map(self.formulas.add, formulas_of_hook))
         programs += [NO_PROGRAM] * (FRICTION - len(programs))
         self.programs.append([*programs, self.formulas.add(fix.wall_friction)])
-        if fix.accelerates and self.wet:
-            self.rows.append((address, arrays.POST_WATER_TO_GRID, begin, end, -1, *uses))
-            self.programs.append(self.programs[-1])
         self.uses_first |= not hook.on_nodes and any(f.names & FIRST for f in formulas)
         if hook.holds and hook.on_nodes:
             self.holding.append(fix)
@@ -185,12 +183,7 @@ def _put(pieces: list[np.ndarray], piece: np.ndarray) -> tuple[int, int]:
 class ActingFixes:
     def __init__(self, simulation: SceneState, fixes: list[Fix]):
         self.simulation, self.fixes = simulation, fixes
-        wet = is_wet(simulation.hub)
-        self.functions = [  # functions by row
-            hook.function
-            for fix, _, hook in compiled_hooks(fixes)
-            for _ in range(1 + (fix.accelerates and wet))
-        ]
+        self.functions = [hook.function for _, _, hook in compiled_hooks(fixes)]  # by row
         self.compiled = lower_hooks(simulation.hub, fixes, simulation.mode, simulation.threads)
         self.in_python: dict[int, list[tuple[Fix, Callable]]] = {}  # hooks by stage
         for fix in fixes:
