@@ -86,6 +86,7 @@ class Field(NamedTuple):
     family = ""  # a field continues the values of another one of its family in an earlier run
     start = 0.0
     columns = ()
+    filled = False  # nodes: four numbers from a multiple of four on are loaded and stored at most
 
     @staticmethod
     def shown(values: np.ndarray, table: Any) -> np.ndarray:
@@ -203,7 +204,7 @@ def at_nodes(kind: type[Field], kin: Any, count: int, real: type) -> NamedTuple:
     """Make a field (count, components) with initial values."""
     width = kind.shape(kin)
     # Three numbers are loaded and stored as four, which fill a register.
-    array = records(count, width if width < 3 else -(-(width + 1) // 4) * 4, real)
+    array = records(count, width if width < 3 else -(-(width + (not kind.filled)) // 4) * 4, real)
     if (start := _start(kind, kin, real)).any():
         array[:, :width] = start
     return kind(array)

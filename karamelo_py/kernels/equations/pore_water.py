@@ -114,6 +114,7 @@ class WaterSums(SummedField):
     """
 
     shape = staticmethod(lambda kin: max(of_unseen(kin) + 2, of_pressure(kin) + 2 * kin.dimension))
+    filled = True
 
 
 class WaterAgain(FieldMappedAgain):
@@ -129,7 +130,7 @@ class WaterUpdate(StepField):
     the velocity of a fix that holds the soil at the node.
     """
 
-    shape = numbers(4, 2)
+    shape = staticmethod(lambda kin: 2 * kin.dimension + max(3, 1 + kin.dimension))
 
 
 class Flux(Field):
@@ -140,6 +141,7 @@ class Flux(Field):
     """
 
     shape = numbers(6, 1)
+    filled = True
 
 
 class GivenPressure(StepField):
@@ -276,10 +278,14 @@ def _affine_force_and_area(pt, w):
 
 
 MASS = eq.MASS._replace(array=WaterSums)
-MOMENTUM = eq.MOMENTUM._replace(
-    array=WaterSums, end=lambda kin: min(arrays.of_force(kin), of_drag(kin))
+# Ends are the next first columns, so that the record is moved as a whole, with forces of 0.
+MOMENTUM = eq.MOMENTUM._replace(array=WaterSums, end=of_drag)
+DRAG = eq.NodeColumns(
+    WaterSums,
+    of_drag,
+    scalar,
+    lambda kin: of_unseen(kin) if kin.dimension == 2 else of_volumes(kin),
 )
-DRAG = eq.NodeColumns(WaterSums, of_drag, scalar, lambda kin: of_drag(kin) + 1)
 VOLUMES = eq.NodeColumns(WaterSums, of_volumes, lambda kin: 4, of_pressure)
 PRESSURE = eq.NodeColumns(
     WaterSums, of_pressure, lambda kin: 2 * kin.dimension,
