@@ -50,7 +50,8 @@ ADDITIONS = (
     (Move, OF_MOVE),
     (Strain, Added(before=(NodeTask(pores.MakeFlux, make=make_flux),), first=(pores.Seep(),))),
 )
-SLOW_ADDITIONS = ((MassMomentum, Added(then=(pores.WaterMomentum(),))),)
+# `Drag` sets forces in the record to 0.
+SLOW_ADDITIONS = ((MassMomentum, Added(then=(pores.WaterMomentum(), pores.Drag()))),)
 
 
 class Water(NamedTuple):

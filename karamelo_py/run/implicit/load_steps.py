@@ -294,7 +294,7 @@ class LoadSteps:
         more = self.seconds, self.fixed_nodes
         newton = Newton(self.scheme, equations, ~bound, inertia, pushing, external, dt, *more)
         newton.scale(self.moduli, self.scheme.stabilisation)
-        newton.seepage = Seepage(equations, hooks, dt) if is_wet(equations) else None
+        newton.seepage = Seepage(equations, dt) if is_wet(equations) else None
         newton.bodies = moving
         try:
             jump = np.where(bound, velocities * dt, 0.0)

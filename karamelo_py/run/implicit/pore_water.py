@@ -26,8 +26,6 @@ from karamelo_py.kernels.equations.pore_water import (
     WaterSums,
 )
 from karamelo_py.kernels.export import export
-from karamelo_py.kernels.pore_water import AT_WATER
-from karamelo_py.kernels.step import take_rows
 from karamelo_py.points.laws import initial_state, specific_volume, wave_speed_squared
 from karamelo_py.points.laws.pore_water import State, drag_per_volume, pore_pressure, porosity
 from karamelo_py.run.implicit.equations import Equations, interpolation, valid
@@ -51,7 +49,7 @@ class Seepage:
     (block, stencils).
     """
 
-    def __init__(self, equations: Equations, hooks: Tag, dt: float):
+    def __init__(self, equations: Equations, dt: float):
         s, self.d, self.dt = equations.s, equations.d, dt
         self.equations, self.m = equations, len(equations.nodes)
         self.wet = [
@@ -61,10 +59,7 @@ class Seepage:
         ]
         self._read_points()
         self._read_stencils()
-        of_water, first = field(s.nodes.fields, WaterSums), of_force(s.kin)
-        of_water[equations.nodes, first : first + self.d] = 0.0
-        take_rows((AT_WATER,), s, equations.mode, hooks)
-        sums = of_water[equations.nodes]
+        sums, first = field(s.nodes.fields, WaterSums)[equations.nodes], of_force(s.kin)
         self.weight = sums[:, first : first + self.d].astype(float)
         mass = np.where(sums[:, MASS] > 0, sums[:, MASS], 1.0)[:, None]
         density = self.rho * self.full / self.pores

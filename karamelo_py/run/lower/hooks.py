@@ -116,7 +116,7 @@ class _Builder:
         self.rigid_fields = method.rigid_fields(hub) if method is not None else np.zeros(0, bool)
         self.rigid = any(solid.rigid for solid in hub.solids.values())
         self.whole: list[Tag] = []  # hooks that treat all directions of a point at once
-        self.wet = is_wet(hub) and not hub.update.scheme.traits.implicit
+        self.wet = is_wet(hub)
 
     def add(self, fix: Fix, moment: str, hook: CompiledHook) -> None:
         begin, end = self._members(fix, hook)
