@@ -269,7 +269,9 @@ def add_work_at_node(i, outcome, s, copies):
 
 def add_more(i, outcome, s, block, copies):
     points, more = known_to_laws(block.points), watch.more_of(block)
-    watch.add_more(s.kin, points, more, _copy_of(copies, i), index(i))
+    kinetic, done = watch.take_more(s.kin, points, more, index(i))
+    totals.add_to(_copy_of(copies, i), totals.KINETIC, kinetic)
+    totals.add_to(_copy_of(copies, i), totals.WORK, done)
 
 
 def look_before(i, outcome, s):

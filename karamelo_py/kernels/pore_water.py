@@ -46,7 +46,7 @@ ADDITIONS = (
         MomentumAgain,
         Added(instead=pores.MixtureMomentumAgain(), then=(pores.WaterMomentumAgain(),)),
     ),
-    (NodalUpdate, Added(before=(NodeTask(pores.ShareForces, make=share_forces),))),
+    (NodalUpdate, Added(instead=NodeTask(pores.ShareForces, make=share_forces))),
     (Move, OF_MOVE),
     (Strain, Added(before=(NodeTask(pores.MakeFlux, make=make_flux),), first=(pores.Seep(),))),
 )

@@ -341,8 +341,10 @@ def _rows_of_scene(row, s):
 
 @in_scene.on(NodeTask)
 def _after_others(row, s):
-    kind = row.task if row.make else type(row.task)
-    return (row,) if row.at else (*additions_of(kind, s).before, row)
+    if row.at:
+        return (row,)
+    additions = additions_of(row.task if row.make else type(row.task), s)
+    return *additions.before, row if additions.instead is None else additions.instead
 
 
 @in_scene.on(Sweep)

@@ -111,32 +111,38 @@ def more_of(block):
     return law, tuple([one for one in block.points.fields if type(one) in MORE])
 
 
-def add_more(kin, points, more, sums, p):
-    """Add a point's energy of rotation and of water; take its work of forces, and of water."""
+def take_more(kin, points, more, p):
+    """Return energy of rotation and water, and work of forces and water, which is set to 0."""
     laws, (around, relative, work) = more[0], [field(more[1], kind) for kind in MORE]
+    kinetic = done = 0.0
     if around is not None:
         v = float(around[0, p])
-        totals.add_to(sums, totals.KINETIC, 0.5 * float(points.mass[p]) * v * v)
+        kinetic += 0.5 * float(points.mass[p]) * v * v
     if isinstance(laws, Saturated):
         law, state = state_at(kin, points, laws, p)
         v = load_vector(kin, points.v, p) + load_vector(kin, relative, p)
         mass = points.mass[p] * specific_volume(law) * water_content(law, kin, state)
-        totals.add_to(sums, totals.KINETIC, float(0.5 * mass * dot(v, v)))
+        kinetic += float(0.5 * mass * dot(v, v))
     if isinstance(laws, Across):
         law, state = state_at(kin, points, laws, p)
-        across = points.mass[p] * specific_volume(law) * state.work
-        totals.add_to(sums, totals.WORK, float(across))
+        done += float(points.mass[p] * specific_volume(law) * state.work)
         store(points.state, p, state._replace(work=0))
     if work is not None:
-        totals.add_to(sums, totals.WORK, float(work[0, p]))
+        done += float(work[0, p])
         work[0, p] = 0
+    return kinetic, done
 
 
 @kernel
-def _add_more(kin, points, more, control):
+def _add_more(kin, points, more, tiling, control):
     points, more = at_hand(points), at_hand(more)
-    for p in range(points.mass.size):
-        add_more(kin, points, more, control.totals, p)
+    for t in range(tiling.count[0]):
+        kinetic = done = 0.0
+        for p in range(tiling.range[t, 0], tiling.range[t, 1]):
+            of_motion, of_forces = take_more(kin, points, more, p)
+            kinetic, done = kinetic + of_motion, done + of_forces
+        totals.add_to(control.totals, totals.KINETIC, kinetic)
+        totals.add_to(control.totals, totals.WORK, done)
     totals.carry(control.totals[totals.WORK])
 
 
@@ -159,7 +165,8 @@ def sum_energies(s, mode):
             gone = field(block.points.fields, TransferLoss)
             _sum_energies(mode, matter_of(s.kin, block), gone, block.tiling, s.control)
         if any(more_of(block)):
-            _add_more(s.kin, known_to_laws(block.points), more_of(block), s.control)
+            points, more = known_to_laws(block.points), more_of(block)
+            _add_more(s.kin, points, more, block.tiling, s.control)
     at_nodes = field(s.nodes.fields, WorkAtNodes)
     if at_nodes is not None:
         _take_work_at_nodes(s.spans, at_nodes, s.control)

@@ -48,7 +48,12 @@ from karamelo_py.kernels import equations as eq
 from karamelo_py.kernels.equations.fbar import VolumeCorrection
 from karamelo_py.kernels.equations.internal_force import WorkOfForces
 from karamelo_py.kernels.equations.mass_momentum import MassMomentum, MomentumAgain
-from karamelo_py.kernels.equations.node_updates import WorkAtNodes, node_task
+from karamelo_py.kernels.equations.node_updates import (
+    NodalUpdate,
+    WorkAtNodes,
+    at_node,
+    node_task,
+)
 from karamelo_py.kernels.equations.strain import increment
 from karamelo_py.kernels.records import put_at, row
 from karamelo_py.points import laws
@@ -529,18 +534,19 @@ class SplitMomentum(NamedTuple):
 
 @node_task
 class ShareForces(NamedTuple):
-    """Sets the force on the water and, for fixes, a node's mass and force with dragged water."""
+    """Updates v*; sets force on water and, for fixes, mass and force with dragged water."""
 
     rim: float  # |B| / V of closed nodes
     surface: float  # |B| / V of nodes at the surface
 
-    says = "forces on soil and water"
-    goes_through = ("sums", "water sums", "water update")
+    says = "forces on soil and water, update v*"
+    goes_through = ("sums", "water sums", "water update", "update")
 
     def at_node(task, kin, nodes, n, dt):
         if is_wet_node(nodes, kin, n):
             close_if_dry(nodes, kin, n)
         share_forces(task, kin, nodes, n, dt)
+        at_node(NodalUpdate(), kin, nodes, n, dt)
 
 
 class Mapped(NamedTuple):
