@@ -17,8 +17,8 @@ from karamelo_py.points.laws.pore_water import with_pore_pressure
 
 
 def _rim(s):
-    # With a linear basis all nodes count as surface nodes. With splines, B is not exactly 0 inside.
-    return 0.0 * _surface(s) if isinstance(s.basis, Linear) else _surface(s)
+    # With splines, B is not exactly 0 inside.
+    return None if isinstance(s.basis, Linear) else _surface(s)
 
 
 def _surface(s):

@@ -386,6 +386,8 @@ def _taken_up(b):
 
 
 def _is_rim(nodes, kin, n, rim):
+    if rim is None:
+        return True
     sums, first = field(nodes.fields, WaterSums), of_pressure(kin) + kin.dimension
     V = sums[n, of_volumes(kin)]
     squared = real(0, V)
@@ -536,7 +538,7 @@ class SplitMomentum(NamedTuple):
 class ShareForces(NamedTuple):
     """Updates v*; sets force on water and, for fixes, mass and force with dragged water."""
 
-    rim: float  # |B| / V of closed nodes
+    rim: float | None  # |B| / V of closed nodes; None: all nodes (linear basis)
     surface: float  # |B| / V of nodes at the surface
 
     says = "forces on soil and water, update v*"
@@ -599,7 +601,7 @@ class DragWater(NamedTuple):
 
 @node_task
 class MakeFlux(NamedTuple):
-    rim: float
+    rim: float | None
     velocity: arrays.Tag  # Mapped or OfStep
 
     says = "flux of the water"
@@ -636,9 +638,11 @@ class MakeFlux(NamedTuple):
         supply = mass_given(nodes, kin, n, True)
         stays = across + supply if closed else supply
         leaves = across + supply if drained else real(0, dt)
-        columns = of_V + 3, of_unseen(kin), of_V + 2, of_unseen(kin) + 1
-        means = [water[n, column] * per_volume for column in columns]
-        put_at(flux, n, d, (real(0, dt) if drained else stays * per_volume, *means, leaves))
+        put_at(flux, n, d, (real(0, dt) if drained else stays * per_volume,))
+        flux[n, d + 5] = leaves
+        if task.rim is not None:  # splines
+            columns = of_V + 3, of_unseen(kin), of_V + 2, of_unseen(kin) + 1
+            put_at(flux, n, d + 1, [water[n, column] * per_volume for column in columns])
         # With the mean relative velocity in the step, the remaining work is the work of weight
         # minus the work of drag, and the work of pressure on water that enters or leaves.
         work = dt * (supply - leaves) * p * water[n, of_V + 1] * per_mass
