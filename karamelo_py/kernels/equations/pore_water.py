@@ -682,6 +682,7 @@ class MoveWater(eq.Task):
         # Drag on velocities in the null space of the grid, with constant momentum of the point.
         per_mass = laws.specific_volume(law)
         m = per_mass * water_content(law, pt.kin, state)
+        # The pores follow the mean strain of a cell with a linear basis, so this is not det F.
         drag = per_mass * (state.pores + (1 - law.n)) * drag_per_volume(law, pt.kin, state)
         b = pt.w.kick * drag * (1 + m)  # times the mass m
         unseen = (b / (m + b)) * (new - at_nodes)
