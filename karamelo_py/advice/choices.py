@@ -1,8 +1,8 @@
 """Rules of ``method(auto)``: the first row whose `when` is true is chosen.
 
-`when` gets the facts of the scene (:class:`karamelo_py.advice.choosing.Scouted`). Their attributes
-replace names in braces in `lines`. `evidence` lists the scenes on which the row is based. Studies
-compare the chosen row with `ALTERNATIVES`.
+`when` gets the facts of the scene (:class:`karamelo_py.advice.choosing.Scouted`). Attributes of the
+facts replace names in braces in `lines`. `evidence` lists the scenes on which the row is based.
+Studies compare the chosen row with `ALTERNATIVES`.
 """
 
 from collections.abc import Callable

@@ -115,7 +115,7 @@ def taken_by(hub: Hub) -> list[str]:
     takers, transfer, scheme = [], hub.update.transfer, hub.update.scheme
     if damping := scheme.traits.damping(scheme):
         takers.append(f"scheme {registry.name_of('scheme', type(scheme))} with {damping}")
-    # Motion within cells is lost, because nodal velocities do not contain it.
+    # Motion within cells is lost, because nodal velocities do not contain this motion.
     if flip_coefficient(transfer) < 1:
         takers.append(f"transfer {words_of_transfer(hub)}")
     return takers

@@ -1,6 +1,6 @@
 """Combinations that are known to fail, with reason and fix.
 
-These rules (`karamelo_py.language.rules`) concern several parts. Each is reported once.
+These rules (`karamelo_py.language.rules`) concern several parts. Each rule is reported once.
 """
 
 from collections.abc import Iterable, Iterator

@@ -56,7 +56,7 @@ GRACE = 2.0  # seconds after the end of mpiexec in which processes must end
 AT_ONCE = 3  # number of signals after which processes are killed
 LONGEST_FOLDER = 70  # characters, since names of sockets must be short
 A_CORE = 16  # processes per core; a larger number is a mistake
-# Seconds until a failed process ends the others. Meanwhile, rank 0 can report the error.
+# Seconds until a failed process ends the other processes. Meanwhile, rank 0 can report the error.
 PATIENCE, LONGER = 2.0, 6.0
 
 
@@ -324,7 +324,7 @@ def together(
         sys.stdout.flush()
         if not stays:
             comm.abort(status)
-        # The launcher already has the exit status; mpiexec would print a message about it.
+        # The launcher already has the exit status, about which mpiexec would print a message.
         return 0 if _link is not None and comm is not None else status
 
     status, text = outcome_of(act, debugging=debugging)

@@ -43,7 +43,7 @@ def end_with(study: int) -> None:
 
 
 def _watch(study: int) -> None:
-    """End this process when the study ends, if the system does not do so."""
+    """End this process when the study ends, if the system does not end it."""
     import time
 
     import psutil

@@ -236,7 +236,8 @@ class Simulation:
     names or formulas, and None is NULL. ``sim.fix(ID, "python", group, function)`` accepts a
     function, ``sim.solid(ID, "points", columns, ...)`` a dictionary of arrays or a DataFrame.
 
-    Commands that give a value, such as ``sim.value("Ek")`` and ``sim.xcm("all", "x")``, return it.
+    Commands that give a value, such as ``sim.value("Ek")`` and ``sim.xcm("all", "x")``, return this
+    value.
 
     Different simulations may run in different Python threads. Calling one simulation from two
     threads at the same time raises SimulationError.

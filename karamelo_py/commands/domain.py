@@ -145,8 +145,8 @@ def boundary(
     periodic. Points return to the domain every 10 steps. Dumps may show them outside before, and
     compute center_of_mass jumps when they return. Periodic directions need method ulmpm with a
     linear basis or splines, scheme musl, any transfer except XPIC, and one process without a GPU.
-    They cannot be combined with other styles of boundary, axisymmetry, heat, contact of points,
-    tools that end in a periodic direction or free rigid bodies.
+    Periodic directions cannot be combined with other styles of boundary, axisymmetry, heat, contact
+    of points, tools that end in a periodic direction or free rigid bodies.
 
     With `shear`, bodies should fill the domain and start with the mean velocity vx = `shear` y (fix
     initial_velocity_particles), without F-bar or pore_water. Momentum is conserved to round-off.
@@ -282,7 +282,7 @@ def solid(hub: Hub, ID: str, kind: Annotated[str, StyleOf("solid")], *arguments:
     Parameters
     ----------
     kind
-        Where the points come from.
+        Source of the points.
     arguments
         For ``region``: ``regionID, ppc, material, h[, T0]``: the region, the points per cell in
         each direction, the material, the cell size, and the initial temperature (default: the

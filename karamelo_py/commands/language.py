@@ -97,7 +97,7 @@ def include(hub: Hub, file: str) -> None:
 
 
 def quit_(hub: Hub) -> None:
-    """End the script here. The bare word quit does the same.
+    """End the script here. The bare word quit also ends the script.
 
     Example
     -------

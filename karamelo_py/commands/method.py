@@ -32,9 +32,9 @@ def method(
     Parameters
     ----------
     kind
-        Which grids are used, and whether points move through them.
+        The grids that are used, and whether points move through them.
     transfer
-        How velocity is mapped from nodes to points.
+        How the velocity is mapped from the nodes to the points.
     basis
         The basis functions of the nodes; ``linear`` for the cpdi methods.
     options
@@ -138,7 +138,7 @@ def auto(
     ----------
     accuracy
         The largest error, a fraction, for ``karamelo-py advise``, which compares this choice with
-        other set-ups (docs/studies/advise.md). A single run does not check it.
+        other set-ups (docs/studies/advise.md). A single run does not check this error.
     """
     _refuse_after_solids(hub)
     interpreter = hub.interpreter
@@ -262,7 +262,7 @@ def anti_volumetric_locking(hub: Hub, active: bool) -> None:
     Yield surfaces of mohr-coulomb, drucker-prager and mu-i use the pressure p + c (p_mean - p),
     where p is the pressure of the point, p_mean the averaged pressure, and c = (sin(phi) -
     sin(psi))/(sin(phi) (1 - sin(psi))). With p alone, non-dilatant sand would lose half of its
-    strength. Implicit load steps use p alone: do not use F-bar for non-dilatant sand with them.
+    strength. Implicit load steps use p alone: with them, do not use F-bar for non-dilatant sand.
 
     See Also
     --------

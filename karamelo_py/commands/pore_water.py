@@ -48,7 +48,8 @@ def pore_water(
     rho
         Density of the water.
     gravity
-        Gravity in the definition of the conductivity. It is not a load (see fix body_force).
+        Gravity in the definition of the conductivity. This gravity is not a load (see fix
+        body_force).
     kozeny
         true: the permeability follows n^3/(1 - n)^2 (Kozeny & Carman).
     suction
@@ -71,15 +72,15 @@ def pore_water(
 
     Surfaces are impermeable, except at nodes of a fix pore_pressure. Loads on a surface act on the
     soil; a fix that holds nodes holds the soil, and its reaction includes the water. Fix body_force
-    acts on both. Computes of mass, momentum and energy (linear_momentum, kinetic_energy, ...) count
-    the soil alone; the stored energy includes the compressed water. The energy balance includes the
-    water, its drag, inflow and outflow.
+    acts on soil and water. Computes of mass, momentum and energy (linear_momentum, kinetic_energy,
+    ...) count the soil alone; the stored energy includes the compressed water. The energy balance
+    includes the water, its drag, inflow and outflow.
 
     The stable step is set by the fast compression wave (about 1850 m/s in water-saturated soil),
     not by the drag. With N cells along a drainage path of length L, consolidation to Tv = 1 takes
     about 2 N L c/c_v steps, where c is the wave speed and c_v the coefficient of consolidation.
-    With scheme(semi-implicit), c is the wave speed of the dry soil. If these are too many steps, as
-    at 1e-9 m/s, use scheme(quasi-static), or multiply the densities by a factor, as in
+    With scheme(semi-implicit), c is the wave speed of the dry soil. If too many steps are needed,
+    as at 1e-9 m/s, use scheme(quasi-static), or multiply the densities by a factor, as in
     inputs/in.terzaghi.
 
     Use this command before the first solid of the material. It needs method ulmpm or tlmpm with

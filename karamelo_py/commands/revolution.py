@@ -38,9 +38,9 @@ def axisymmetric(hub: Hub, active: bool, *, twist: bool = False) -> None:
     publishes the angular momentum about the axis as ID_y, conserved to round-off.
 
     Load steps (scheme quasi-static) also solve for the rotation of the nodes. In ulmpm/contacts,
-    fix contact/friction also acts around the axis: ContactTorque_ID_y is the torque about it. Twist
-    cannot be combined with scheme newmark, contact in load steps, contact between points or with
-    surfaces, tools, walls with bounds or friction, rigid solids, periodic directions or CPDI.
+    fix contact/friction also acts around the axis: ContactTorque_ID_y is the torque about the axis.
+    Twist cannot be combined with scheme newmark, contact in load steps, contact between points or
+    with surfaces, tools, walls with bounds or friction, rigid solids, periodic directions or CPDI.
 
     See Also
     --------

@@ -17,7 +17,7 @@ def deactivate(hub: Hub, group: ParticleGroup) -> None:
     Parameters
     ----------
     group
-        Group of points. They have no mass, stress or position until they are activated.
+        Group of points. These points have no mass, stress or position until they are activated.
 
     Example
     -------

@@ -174,10 +174,7 @@ def as_rows_of_points(array: np.ndarray) -> np.ndarray:
 
 
 def some_points(array: np.ndarray, points: np.ndarray) -> np.ndarray:
-    """Select points from an array (..., n).
-
-    ``np.take`` would first copy arrays with gaps between rows.
-    """
+    """Select from an array (..., n); ``np.take`` would first copy arrays with gaps between rows."""
     return np.ascontiguousarray(array[..., points])
 
 

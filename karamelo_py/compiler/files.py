@@ -36,7 +36,7 @@ def _guard(directory: Path) -> None:
     """Raise an error if other users can write to a folder; make the user's folders private."""
     for one in (directory, directory.parent):
         about = one.stat()
-        if about.st_mode & stat.S_ISVTX:  # others may not delete files there
+        if about.st_mode & stat.S_ISVTX:  # other users may not delete files there
             continue
         if hasattr(os, "geteuid") and about.st_uid == os.geteuid() and about.st_mode & _BY_OTHERS:
             one.chmod(stat.S_IMODE(about.st_mode) & ~_BY_OTHERS)

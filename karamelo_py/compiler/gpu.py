@@ -1,7 +1,7 @@
 """GPU code: functions of one thread, device memory, and launches.
 
-``f(i, ...)`` defines the work of thread `i`. It is traced like a kernel and compiled to PTX.
-:class:`Emulator` runs the same code on the processor, thread after thread.
+``f(i, ...)`` defines the work of thread `i`. The function is traced like a kernel and compiled to
+PTX.
 """
 
 import ctypes
@@ -331,7 +331,7 @@ class Counted(Emulator):
 
 class Card(_Coded):
     on_card = True
-    copies = 64  # copies of the totals, so that neighbouring threads rarely add to the same one
+    copies = 64  # copies of the totals: neighbouring threads rarely add to the same copy
 
     def __init__(self) -> None:
         try:

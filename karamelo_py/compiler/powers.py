@@ -1,8 +1,8 @@
 """Logarithm, exponential and power with equal bits for numbers and lanes.
 
-They are evaluated as series after range reduction (Muller 2016, "Elementary Functions", chapter
-11). Relative errors are about twice the round-off; for powers, multiply by |y ln x| if this is
-above 1. Interpreted code uses Python's functions.
+The functions are evaluated as series after range reduction (Muller 2016, "Elementary Functions",
+chapter 11). Relative errors are about twice the round-off; for powers, multiply by |y ln x| if this
+is above 1. Interpreted code uses Python's functions.
 """
 
 import math

@@ -2,7 +2,7 @@
 
 Point functions of dual numbers return exact derivatives (Griewank & Walther 2008, "Evaluating
 Derivatives", chapter 3); for the stress of a law this is the consistent tangent. Values are
-identical to those computed without derivatives. There is no code for slopes that are the literal 0.
+identical to those computed without derivatives. Slopes that are the literal 0 make no code.
 """
 
 import math

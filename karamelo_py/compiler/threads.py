@@ -243,17 +243,15 @@ def _in_parallel(lowering: Any, count: Any, task: Value, arguments: Value, threa
 # Protocol. Thread 0, the leader, runs the kernel and publishes each parallel loop; other threads
 # serve. Only the leader writes _STATE. Each thread has a range of the indices of a loop, and a
 # ticket: the number of the loop, and how many indices of the range are left. A thread takes an
-# index by decreasing a ticket with compare-and-swap. This is correct because:
-# 1. Each index is processed once: only one of several swaps of a ticket succeeds, and
-#    tickets of different loops differ.
-# 2. A thread that has taken an index sees the task, arguments and count of its loop. The leader
-#    writes them before it stores the tickets (release), and a swap acquires the ticket; swaps by
-#    other threads in between continue the release.
-# 3. A loop ends when the leader's indices and those in _DONE make up the count. Other threads add
-#    to _DONE after their work (release), and the leader acquires it, so it sees their results.
-# 4. The leader takes indices that are left itself. It waits only for indices that other threads
-#    have taken, never for a thread that sleeps or was preempted.
-# The words are in separate cache lines:
+# index by decreasing a ticket with compare-and-swap. The protocol is correct because: 1. Each index
+# is processed once: only one of several swaps of a ticket succeeds, and tickets of different loops
+# differ. 2. A thread that has taken an index sees the task, arguments and count of its loop. The
+# leader writes them before it stores the tickets (release), and a swap acquires the ticket; swaps
+# by other threads in between continue the release. 3. A loop ends when the leader's indices and
+# those in _DONE make up the count. Other threads add to _DONE after their work (release), and the
+# leader acquires it, so it sees their results. 4. The leader takes indices that are left itself.
+# The leader waits only for indices that other threads have taken, never for a thread that sleeps or
+# was preempted. The words are in separate cache lines:
 _STATE, _SIZE, _TASK_AT, _ARGUMENTS, _COUNT, _DONE, _EPOCH = range(0, 7 * 64, 64)
 _RESULT, _TICKETS = range(7 * 64, 9 * 64, 64)
 _WAITS, _LEADS, _ENDED = range(3)  # values of _STATE

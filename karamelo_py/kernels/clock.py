@@ -19,7 +19,7 @@ def step_size(s: Setup) -> Number:
 
 
 def last_step_size(s: Setup) -> Number:
-    """Return the previous dt. Before the first step it is tiny, but not 0, as laws divide by it."""
+    """Return the previous dt. Before the first step dt is tiny, but not 0, as laws divide by it."""
     last = s.control.step[0].last_dt
     least = NEXT_TO_NOTHING * s.control.values[DT]
     return real(last if last > 0 else least, s.nodes.sums[0, MASS])

@@ -6,7 +6,7 @@ mu times the normal one. Momentum is conserved to round-off.
 
 Where more than two fields meet, all pairs start from the same velocities, so the order of solids
 does not matter. Each impulse is divided by the larger of the two bodies' numbers of approaching
-pairs, so that energy does not grow; iterations remove the rest.
+pairs, so that energy does not grow; iterations remove the remaining approach.
 
 Fields overlap up to two cells before the bodies touch. The gap is therefore measured from the mean
 positions of each body's points (`karamelo_py.points.basis.surface`), along the normal and along the
@@ -238,9 +238,9 @@ def _normal(bodies, n, other):
     """Return the outward normal of a body, and the squared sine of its scatter.
 
     The sums of m grad N of neighbouring nodes are averaged with weights 1/4, 1/2, 1/4 along each
-    axis. This is accurate to 2 degrees on a plane face. The sum of a single node has errors of tens
-    of degrees while inclined rows of points pass it. A node is omitted if its sum has the direction
-    of `other`, the other body's normal: only one face of a thin wall counts.
+    axis. This average is accurate to 2 degrees on a plane face. The sum of a single node has errors
+    of tens of degrees while inclined rows of points pass it. A node is omitted if its sum has the
+    direction of `other`, the other body's normal: only one face of a thin wall counts.
 
     The length of the normal is its weight relative to the other body's: it increases with surface
     and decreases with scatter. (With the larger sum, as in Lemiale, Nairn & Hurmane 2010, the

@@ -43,7 +43,7 @@ def export(quantity, times_volume, matter, out):
 def imposing(change: Callable) -> Any:
     """Make a kernel that sets points' states to ``change(law, kin, state, value)``.
 
-    It takes a `Matter`, the rows of the points, and a value for each.
+    The kernel takes a `Matter`, the rows of the points, and a value for each point.
     """
 
     @kernel

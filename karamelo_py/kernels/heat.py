@@ -97,7 +97,7 @@ def _at_heated_points(row, s, step):
     at_heated_points(step.hooks, s)
 
 
-# The same loop gathers and scatters.
+# Heat is gathered and scattered in one loop.
 MAP = Visit((of_heat.Warming(),), (of_heat.HeatContent(),), OldWeights())
 FLOW = Visit((of_heat.TemperatureGradient(),), (of_heat.HeatFlow(),), OldWeights())
 

@@ -505,7 +505,7 @@ def _rub_at_nodes(members, call, count):
 
 @noinline
 def _work_at_nodes(members, call, count):
-    """Sum the work of loads on the chosen nodes, and clear them.
+    """Sum the work of loads on the chosen nodes, and clear the loads.
 
     Work is the force times the mean of the velocities before and after the step, including stress,
     constraints and contact. With the velocity mapped again after the step it is exact for FLIP, as
@@ -675,7 +675,7 @@ def _act_on_motion(members, task, call, count):
             continue
         _evaluate_now_and_before(call, c, count)
         slot = hooks.table[h].slot
-        # The work counts from the velocity that the hook prescribed one step earlier.
+        # Work is counted from the velocity that the hook prescribed one step earlier.
         leads = hooks.table[h].stage == arrays.POST_ADVANCE_PARTICLES
         leads = leads and hooks.table[h].uses_before > 0
         for q in range(count):

@@ -299,8 +299,8 @@ def vector_hook(
     ----------
     function
         ``function(*read, values, dt)`` gets the quantities in `reads`, the values of the fix's
-        `formulas`, and the time of the move. It returns the new values of `writes` and, with
-        `publishes`, a number or vector to sum and publish; several results form a tuple.
+        `formulas`, and the time of the move. The function returns the new values of `writes` and,
+        with `publishes`, a number or vector to sum and publish; several results form a tuple.
     reads
         Words of `WORDS`, classes of declared fields (a number, vector or tuple of numbers), or
         functions (law, kin, state) such as ``laws.cauchy_stress``.

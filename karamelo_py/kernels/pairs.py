@@ -196,7 +196,7 @@ def _find_cells(d, bodies, cells, width):
             cells.start[number + 1] += 1
     for c in range(used):
         cells.start[c + 1] += cells.start[c]
-    # This moves start[c] to the end of cell c, where cell c + 1 begins.
+    # This loop moves start[c] to the end of cell c, where cell c + 1 begins.
     for j in range(n, m):
         c = cells.cell[j]
         if c >= 0:

@@ -571,9 +571,6 @@ def _set_angle(state, dt, dimension):
 
 @noinline
 def _about_origin(body, k):
-    """Return the torque of contact about the origin.
-
-    The position of the centre is the one before this step.
-    """
+    """Return the torque of contact about the origin, with the centre before this step."""
     state, before, i, j = body.state[0], body.solution.before, (k + 1) % 3, (k + 2) % 3
     return state.torque[k] + before[i] * state.force[j] - before[j] * state.force[i]

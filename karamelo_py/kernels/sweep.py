@@ -1,8 +1,8 @@
 """Sweeps over points, tile by tile, and over the nodes in use.
 
 A tile's points scatter to a separate buffer, a dense box of the nodes in reach. Then each tile of
-nodes sums the boxes that reach it. Threads divide tiles without atomics, so the order of sums does
-not depend on their number.
+nodes sums the boxes that reach the tile. Threads divide tiles without atomics, so the order of sums
+does not depend on their number.
 """
 
 from math import inf

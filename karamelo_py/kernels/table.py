@@ -309,7 +309,7 @@ def scene_additions(tag: Any) -> tuple:
 
 
 class BeforeLoads(NamedTuple):
-    """A key of `scene_additions` for rows before the forces of fixes."""
+    """A key of `scene_additions` for rows that precede the forces of fixes."""
 
 
 def additions_of(tag: type, s: Setup) -> Added:
@@ -463,9 +463,9 @@ def any_node(s):
 def light_node(s):
     """Return the task that limits gradients at nodes lighter than d (c dt / h)^2 of a point (USL).
 
-    This fraction is at most 1. At nodes of less mass, strain would change faster than stress can
-    follow. There is no limit with moments in the total frame, which return the whole nodal velocity
-    and would grow with any limit.
+    The fraction d (c dt / h)^2 is at most 1. At nodes of less mass, strain would change faster than
+    stress can follow. There is no limit with moments in the total frame, which return the whole
+    nodal velocity and would grow with any limit.
     """
     if stores_moment(s.transfer) and not s.frame.moves:
         return any_node(s)

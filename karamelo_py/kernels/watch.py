@@ -298,7 +298,7 @@ def judge(control):
     """Update the balance; return True if the energy is within its bound."""
     energy = control.energy[0]
     # Mean of the balances at mid-step (stored energy interpolated) and at the end (kinetic energy).
-    # Both oscillate by (omega dt)^2/8 in opposite phase, their mean by (omega dt)^3/16.
+    # The balances oscillate by (omega dt)^2/8 in opposite phase, their mean by (omega dt)^3/16.
     moving = energy.kinetic - energy.work
     balance = moving + energy.level * (energy.moving_before - moving)
     balance += energy.stored_before + energy.level * (energy.stored - energy.stored_before)

@@ -53,7 +53,7 @@ def AtLeast(least: float) -> Constraint:
 
 
 def In(lo: float, hi: float, open: bool | Literal["lo", "hi", "both"] = False) -> Constraint:
-    """Constrain a number to an interval; `open` names the excluded ends (True: both)."""
+    """Constrain a number to an interval; `open` names the excluded ends (True: both ends)."""
     above = open in (True, "lo", "both")
     below = open in (True, "hi", "both")
 
@@ -147,8 +147,8 @@ class Unfit(Exception):
 class Kind:
     """The description of an argument, and its conversion from text.
 
-    If there are `words`, only these are accepted. `family` is set if the argument names a style of
-    this family. If `with_numbers`, arguments ``name=value`` of the call are numbers in it.
+    If there are `words`, only these words are accepted. `family` is set if the argument names a
+    style of this family. If `with_numbers`, arguments ``name=value`` of the call are numbers in it.
     """
 
     text: str

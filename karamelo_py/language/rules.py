@@ -11,9 +11,9 @@ of a part, field or law::
         cure="APIC or FLIP instead of PIC",
     )
 
-`when` gets the part and the facts of the scene (:class:`karamelo_py.advice.facts.SceneFacts`). It
-returns True if the rule applies; or numbers by name for its text; or a list of such numbers, one
-item per message. Texts can contain these numbers and attributes of ``part``, ``scene`` and
+`when` gets the part and the facts of the scene (:class:`karamelo_py.advice.facts.SceneFacts`).
+`when` returns True if the rule applies; or numbers by name for its text; or a list of such numbers,
+one item per message. Texts can contain these numbers and attributes of ``part``, ``scene`` and
 ``owner`` (the material of a law) in braces, such as ``{scene.turn:.2g}``. Two names have a meaning:
 ``mark`` is the location in the script, and ``share`` is the noise divided by the tolerable amount.
 """
@@ -55,7 +55,7 @@ class Restrictions(NamedTuple):
     only
         Supported names, by kind of choice (method, basis, transfer, scheme, kinematics).
     without, but
-        Unsupported options; `but` replaces the ``instead`` of some of them.
+        Unsupported options; `but` replaces the ``instead`` of some options.
     """
 
     option: str

@@ -75,8 +75,8 @@ def parameters(target: Any) -> list[Parameter]:
 def is_record(target: Any) -> bool:
     """Return True for a NamedTuple, which needs no hub.
 
-    Its arguments are the fields, or the parameters of a classmethod ``given``. A method ``checked``
-    may return a replacement.
+    The arguments of a NamedTuple are the fields, or the parameters of a classmethod ``given``. A
+    method ``checked`` may return a replacement.
     """
     return inspect.isclass(target) and issubclass(target, tuple)
 

@@ -75,7 +75,8 @@ def kind_of_node(axis: int, nodes: NodeTable) -> np.ndarray:
     """Return the kind of each node along one axis, as in Karamelo.
 
     With splines, the kind is -2 at the lower edge and -1 next to it, 2 at the upper edge and 1 next
-    to it. With Bernstein polynomials, it is 1 in the middle of a cell. Otherwise it is 0.
+    to it. With Bernstein polynomials, it is 1 in the middle of a cell. With other bases, the kind
+    is 0.
     """
     basis = nodes.hub.update.method.basis
     splines = type(basis).__name__ in ("QuadraticSpline", "CubicSpline")

@@ -89,8 +89,9 @@ def time_text(time: float, unit: str) -> str:
 def suited(unit: str, size: float, units: Mapping[str, float]) -> tuple[float, str]:
     """Return the factor and name of a metric unit that suits a `size` given in `unit`.
 
-    This is the largest metric unit in which `size` is at least 0.1, or else the smallest. If `size`
-    is 0 or from 0.1 to 10^4, or if `unit` is not metric, `unit` is returned with the factor 1.
+    The unit is the largest metric unit in which `size` is at least 0.1, or else the smallest unit.
+    If `size` is 0 or from 0.1 to 10^4, or if `unit` is not metric, `unit` is returned with the
+    factor 1.
     """
     metric = {name: si for name, si in units.items() if isclose(log10(si) % 3, 0, abs_tol=1e-9)}
     if unit not in metric or not size or 0.1 <= size < 1e4:

@@ -82,7 +82,7 @@ class Column:
 
 
 class Vtu:
-    """Points with columns `names`, and cells.
+    """A file of points, with columns `names`, and of cells.
 
     The temporary files in `folder` are as large as the file together.
     """

@@ -94,7 +94,7 @@ class RollBack:
     def _halve_step(self, status: int) -> None:
         simulation, point = self.simulation, self.point
         trouble = self._explained(status)
-        # This also removes later rows of log and dumps.
+        # The return also removes later rows of log and dumps.
         point.return_to(simulation, cut=True)
         while point.halvings < HALVINGS:
             point.halvings += 1

@@ -158,7 +158,7 @@ def common_velocity(simulation: SceneState, weight: float) -> np.ndarray:
 def courant_number(hub: Hub, *, longer: bool) -> float:
     """Return the stable step / (h/c); `longer`: for points that remain in their cells.
 
-    In the total frame, if points have moments, light nodes of thin and round bodies limit it.
+    In the total frame, if points have moments, light nodes of thin and round bodies limit the step.
     """
     update = hub.update
     total = not (update.scheme.traits.implicit or update.method.frame.moves)
@@ -214,7 +214,7 @@ def _courant_of_scheme(hub: Hub, *, longer: bool) -> float:
 
 
 def own_step_of_waves(hub: Hub, *, still: bool) -> tuple[float, float]:
-    """Return the stable step / (h/c) and the default fraction of it.
+    """Return the stable step / (h/c), and the default fraction of the stable step.
 
     `still`: no point has moved as far as `STILL`.
     """
@@ -247,8 +247,8 @@ def elastic_speed(simulation: SceneState, solid: Solid) -> tuple[float, bool]:
 def stable_conduction(hub: Hub) -> float:
     """Return the smallest stable step of conduction in undeformed bodies.
 
-    The step is h^2 / (4 d) capacity / conductivity. This is half of the bound for lumped finite
-    elements, since points may be anywhere in a cell.
+    The step is h^2 / (4 d) capacity / conductivity. This step is half of the bound for lumped
+    finite elements, since points may be anywhere in a cell.
     """
     if not hub.update.thermal:
         return inf

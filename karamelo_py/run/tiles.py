@@ -432,7 +432,8 @@ def _evenly(parts: np.ndarray, beside: np.ndarray) -> np.ndarray:
     """Return the set, from 0 to SHARES - 1, of each of n tiles of nodes: ascending (n,).
 
     `parts` (n, 10) are the used nodes of each tile (see `Buffers`). All sets have about the same
-    number of nodes. Consecutive tiles with equal `beside` (n,) are in the set of the first one.
+    number of nodes. Consecutive tiles with equal `beside` (n,) are in the set of the first of these
+    tiles.
     """
     size = np.prod(parts[:, 2:5], axis=1)
     middle = np.cumsum(size) - size / 2

@@ -176,7 +176,7 @@ def fill(
     last_cell = np.array(lattice.cells[used]) - 1
     if region.unknown or (lo > hi).any():
         return placed
-    # One more cell at both ends, so that round-off loses no point on a face.
+    # The range has one more cell at both ends, so that round-off loses no point on a face.
     first = np.floor((lo - corner) / h) - 1
     last = np.floor((hi - corner) / h) + 1
     # An open region ends at the domain. Other regions give a warning for points outside the domain.

@@ -10,10 +10,7 @@ from karamelo_py.script.errors import ScriptError
 
 
 def chosen_of(solid: Solid, kept: np.ndarray) -> Placement:
-    """Return the placement of selected points of a solid.
-
-    `kept` is a mask, or numbers that may repeat.
-    """
+    """Return the placement of selected points; `kept` is a mask, or numbers that may repeat."""
     volume = solid.volume0 / solid.domain.depth(solid.x0[:])
     return Placement(
         x0=solid.x0[kept],

@@ -33,7 +33,8 @@ class SchemeTraits(NamedTuple):
     strained_before: float = 0.0
     # whether velocities are mapped to the nodes again after the points have moved
     maps_velocity_again: bool = False
-    # scheme for steps in which fixes prescribe velocities of deformable points; None: this one
+    # scheme for steps in which fixes prescribe velocities of deformable points; None: the scheme
+    # itself
     leading: Any = None
     # whether a drifting body never gains energy
     allows_drift: bool = False

@@ -102,10 +102,7 @@ def _statement(source: syntax.Source, span: tuple[str, str, int, int, Any]) -> s
 
 
 def _arguments(source: syntax.Source, name: str, parts: list) -> list[syntax.Raw]:
-    """Return the raw arguments of a call.
-
-    `parts` are alternately spans (None if empty) and commas.
-    """
+    """Return raw arguments of a call; `parts` are alternately spans (None if empty) and commas."""
     if parts == [None]:
         return []
     raws = []

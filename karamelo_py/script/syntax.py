@@ -125,10 +125,7 @@ class Statement:
     raw: Raw
 
     def spelled(self, without: Iterable[str] = ()) -> str:
-        """Return the statement without blanks, comments and line ends.
-
-        The keywords in `without` are omitted.
-        """
+        """Return the statement without blanks, comments, line ends and keywords in `without`."""
         text = _BLANKS.sub(lambda m: m[0] if m[0][0] == '"' else "", self.raw.code)
         for word in without:
             text = re.sub(rf",{word}=[^,()]*", "", text)

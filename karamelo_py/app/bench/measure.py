@@ -115,7 +115,8 @@ class Measured(NamedTuple):
     def limit(self) -> str:
         """The component that takes at least half of a step: ``overhead``, ``nodes`` or ``memory``.
 
-        Otherwise ``arithmetic`` (instructions or latency); ``unknown`` if not `distinguished`.
+        The result is ``arithmetic`` (instructions or latency) if no component takes half of a step;
+        ``unknown`` if not `distinguished`.
         """
         if not self.distinguished:
             return "unknown"

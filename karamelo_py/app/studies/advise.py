@@ -82,11 +82,11 @@ def forecast(
     """Predict error and cost at `x` from runs at `xs`, coarse ones first.
 
     The result is None if fewer than two errors are known, or if the last error is larger than the
-    one before. The error is extrapolated with the last order. Its bounds follow from the smallest
-    and the largest order; they are at least 33 % above and 50 % below the error. An order that fell
-    may fall as much again; an order below 2 may reach 2. Errors that are small by chance are
-    replaced by `credible` ones. The time is fitted by steps times (a + b points); other costs are
-    extrapolated from the last two runs.
+    one before. The error is extrapolated with the last order. The bounds of the error follow from
+    the smallest and the largest order; they are at least 33 % above and 50 % below the error. An
+    order that fell may fall as much again; an order below 2 may reach 2. Errors that are small by
+    chance are replaced by `credible` ones. The time is fitted by steps times (a + b points); other
+    costs are extrapolated from the last two runs.
     """
     xs, signed = np.asarray(xs, float), errors(rows, accuracy)
     error = credible(xs, signed, highest)
@@ -258,7 +258,7 @@ class Adviser:
         return sorted(chosen, key=lambda c: c.cost)
 
     def best(self) -> Candidate | None:
-        """Return the best candidate, after all runs that may change it.
+        """Return the best candidate, after all runs that may change the choice.
 
         Choices that could become the cheapest are refined to the variant before their candidate.
         """

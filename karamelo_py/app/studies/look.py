@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.axis import Axis
 
-# Colours for colour-blind readers (Okabe & Ito). Each has a marker, for prints in grey.
+# Colours for colour-blind readers (Okabe & Ito). Each colour has a marker, for prints in grey.
 PALETTE = (
     "#000000", "#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9", "#8c510a",
     "#7a7a7a",

@@ -366,7 +366,7 @@ def open_study(
 
     `settings` are further fields of `Study`.
     """
-    gc.enable()  # single runs have disabled it
+    gc.enable()  # single runs have disabled garbage collection
     names, again = list(plan.values), options.again
     place: Pool = Here(plan.launch, plan.jobs)
     study = Study(plan.launch, out, names, items, place, again=again, **settings)

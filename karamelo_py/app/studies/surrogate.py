@@ -109,8 +109,8 @@ def indices(
 ) -> tuple[list[list[tuple[Interval, Interval]]], list[tuple[str, float]]]:
     """Return first and total Sobol' indices by result and variable, and the fit of each result.
 
-    Intervals follow from a delete-group jackknife (10 % of the runs). They include the error of
-    sums over samples, and the error of the fit as far as it changes with the runs.
+    Intervals follow from a delete-group jackknife (10 % of the runs). The intervals include the
+    error of sums over samples, and the error of the fit as far as the fit changes with the runs.
     """
     from scipy.stats import qmc, sobol_indices
 

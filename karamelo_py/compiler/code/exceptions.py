@@ -45,7 +45,7 @@ def note(error: BaseException, at: int) -> None:
 def noting(function: Callable) -> Callable:
     """Record exceptions, including Ctrl-C, of a Python function called by kernels.
 
-    Its last argument is the address of the `Failure`.
+    The last argument of the function is the address of the `Failure`.
     """
 
     @functools.wraps(function)

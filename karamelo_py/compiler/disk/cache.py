@@ -6,7 +6,7 @@ missing, the kernel is traced, and its machine code is sought in a file ``.code`
 LLVM text.
 
 Since files become code, a file is read only if its checksum is correct and no other user can write
-it. Otherwise the kernel is compiled, with a warning.
+it. If a file is not read, the kernel is compiled, with a warning.
 """
 
 import contextlib
@@ -168,7 +168,7 @@ def _registered(count: int, changes: int) -> tuple[str, set[str]]:
 class KernelFiles:
     """Cached kernels of one function for a `processor`, loaded by `load`.
 
-    `called` are the functions that are inlined in them.
+    `called` are the functions that are inlined in the kernels.
     """
 
     def __init__(

@@ -20,7 +20,7 @@ from karamelo_py.compiler.trace.values import (
 )
 
 _PLAIN = (bool, int, float, str, np.generic, type(None))
-_MERGED = (Value, HeldValue, *_PLAIN)  # these may differ between branches
+_MERGED = (Value, HeldValue, *_PLAIN)  # values of these classes may differ between branches
 _DROPPED = object()
 IN_A_LOOP = " between iterations of a loop"
 

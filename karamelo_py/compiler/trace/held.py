@@ -1,8 +1,8 @@
 """Tuples of arrays that are stored in memory and passed as a pointer.
 
 A setup has about forty arrays, each described by seven to nine numbers. As three hundred arguments,
-they would be half of the code to compile. Therefore a (nested) tuple with arrays is stored in
-memory, and kernels get a pointer to the tuple. Its type is still a tuple type.
+these numbers would be half of the code to compile. Therefore a (nested) tuple with arrays is stored
+in memory, and kernels get a pointer to the tuple. The type of the tuple is still a tuple type.
 """
 
 import hashlib

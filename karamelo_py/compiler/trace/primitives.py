@@ -31,8 +31,9 @@ def implements(function: Callable, *numbers: type, by_type: bool = False) -> Cal
     """Decorate the implementation of `function` in kernels for number types (default: all others).
 
     A number type is a NamedTuple with operators (`algebra`), or lanes; it is also found inside
-    tuples. The implementation is traced, or an `intrinsic`. With `by_type` it is a Python function
-    that returns the implementation for argument types, or None for the previous one.
+    tuples. The implementation is traced, or an `intrinsic`. With `by_type` the implementation is a
+    Python function that returns the implementation for argument types, or None for the previous
+    one.
     """
 
     def register(made: Callable) -> Callable:
@@ -66,8 +67,8 @@ def point_function(
     """Declare a pure function of one point, selected by the classes of its first `tags` arguments.
 
     ``name.on(Class, ...)`` adds implementations, also in plug-ins; derived classes inherit them.
-    They run as plain Python (``NUMBA_DISABLE_JIT=1``, tests) and in kernels, which select them at
-    compile time. With ``otherwise`` the decorated function is the default.
+    Implementations run as plain Python (``NUMBA_DISABLE_JIT=1``, tests) and in kernels, which
+    select them at compile time. With ``otherwise`` the decorated function is the default.
 
     Implementations process one point, or several in lanes (:mod:`karamelo_py.compiler.lanes`).
     Functions that branch are listed in ``scalarised`` of a class, and called point by point.
@@ -203,7 +204,7 @@ def _all_bits(builder: ir.IRBuilder, mask: Any, sign: str, wanted: int) -> ir.Va
 def in_lanes(result: Callable, code: Callable) -> Callable[[Callable], Callable]:
     """Decorate a helper of numbers with its code for lanes, the type of its first argument.
 
-    It returns ``result(lanes)``, written by ``code(builder, lanes, *values)``.
+    The helper returns ``result(lanes)``, written by ``code(builder, lanes, *values)``.
     """
 
     def declare(function: Callable) -> Callable:

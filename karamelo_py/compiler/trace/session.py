@@ -1,6 +1,6 @@
 """Memory of the compiler: implementations, functions, types, arrays and machine code.
 
-There is one memory per process, like LLVM's engine and the names in machine code.
+A process has one such memory, as it has one LLVM engine and one set of names in machine code.
 """
 
 import itertools

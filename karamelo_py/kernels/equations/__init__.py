@@ -236,10 +236,7 @@ def is_apart(w):
 
 @reads("mass")
 def mass(pt):
-    """Return the mass that a point adds to the common sums.
-
-    It is 0 for rigid points with separate sums.
-    """
+    """Return the mass added to the common sums, 0 for rigid points with separate sums."""
     m = of_present(pt.p, pt.w.points.mass[pt.p])
     return m - m if is_apart(pt.w) else m
 

@@ -1,11 +1,11 @@
 """Kinetic energy lost in a transfer, returned as heat to laws with internal energy.
 
 A point p of mass m contributes to node i, with weight N_ip m, the velocity a_ip: v_p plus the part
-of its moment. Nodes have the mean v_i. This loses sum_p N_ip m |a_ip - v_i|^2 / 2 >= 0, which is
-returned to points by the same weights. Back at the points, m sum_i N_ip |v_i - v_p|^2 / 2 minus the
-moment's energy is lost. FLIP, v -> alpha v + (1 - alpha) P v, where P maps to the nodes and back,
-loses the fraction 1 - alpha^2 of the first part and (1 - alpha)^2 of the second; likewise AFLIP and
-related transfers, with their moments.
+of its moment. Nodes have the mean v_i. The mapping loses sum_p N_ip m |a_ip - v_i|^2 / 2 >= 0,
+which is returned to points by the same weights. Back at the points, m sum_i N_ip |v_i - v_p|^2 / 2
+minus the moment's energy is lost. FLIP, v -> alpha v + (1 - alpha) P v, where P maps to the nodes
+and back, loses the fraction 1 - alpha^2 of the first part and (1 - alpha)^2 of the second; likewise
+AFLIP and related transfers, with their moments.
 
 XPIC removes Q^m v, Q = 1 - P, and loses <v, Q^m v> - |Q^m v|^2 / 2. With r_k = Q^k v and the terms
 of its series w_k = S+ r_k, this is half of |r_q|^2 + sum_(k >= q) |S w_k|^2 + 2 sum_(k >= [m/2])

@@ -93,7 +93,8 @@ class CellPressures(StepField):
 class NodeResponse(StepField):
     """Velocity v and seepage velocity s (d,), force P of increments (d,), dt / W (d,) or 0.
 
-    Then f n, n, dt f / m; 1 / V of closed nodes, else 0; sum of V q; rate kept at a closed node.
+    Further columns: f n, n, dt f / m; 1 / V of closed nodes, else 0; sum of V q; rate that a closed
+    node retains.
     """
 
     shape = numbers(6, 4)
@@ -401,7 +402,7 @@ def _precondition(system):
 
 @noinline
 def _multiply(system, share):
-    """Update the direction and its product with the matrix; return the scalar product of both."""
+    """Update the direction and its product with the matrix; return their scalar product."""
     pressures, count, result = system.pressures, _count_below(system.kin.dimension), 0.0
     for r in range(1, 1 + system.spans[0, 0]):
         below = _below(system.kin, _grid_of(system.grids, system.spans[r, 0]))

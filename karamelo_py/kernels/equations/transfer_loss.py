@@ -97,7 +97,7 @@ def _kind(pt):
 
 
 def _again(kind, pt, moments):
-    """Return moments as in the second mapping of velocities, if there is one."""
+    """Return the moments that the second mapping of velocities uses, if a scheme has one."""
     if kind.work_with_update:
         return moments
     return tuple([for_second_mapping(pt, one) for one in moments])

@@ -30,7 +30,7 @@ class BasisTraits(NamedTuple):
     # For the stiffness of an isolated point, away from walls: h^2 / D, max h^2 sum_I |grad N_I|^2 /
     # N_I per direction, and a number from the eigenvalues of a usl step with D.
     lone: tuple[float, float, float] | None = None
-    # D / h^2, or None if it varies. Mapping to the nodes and back damps waves in proportion to it.
+    # D / h^2, or None if it varies. Mapping to the nodes and back damps waves in proportion to D.
     spread: float | None = None
     # Fraction of the stable step with corrected accelerations (updated frame).
     corrected_fraction: float = 0.8

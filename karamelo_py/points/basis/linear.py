@@ -19,7 +19,7 @@ WARNED_LOSS = 0.03  # loss of stress for a warning
 class Linear(NamedTuple):
     """Linear hat functions on the nodes: the basis of the original MPM (Sulsky et al. 1994).
 
-    This is the cheapest basis. Its gradient jumps at cell faces: when a stressed point crosses a
+    This is the cheapest basis. The gradient jumps at cell faces: when a stressed point crosses a
     face, nodal forces jump, too (cell-crossing error).
 
     Example

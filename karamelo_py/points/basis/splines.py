@@ -185,7 +185,8 @@ class CubicSpline(NamedTuple):
     # 2.4 h/c in 1D (tests/test_stability.py), 1.8 to 2.4 in 2D, 1.4 to 2.3 in 3D (Poisson's ratio
     # 0.45 and 0). courant_still, as for quadratic splines: 1.9 to 2.7, 1.84 to 2.6, 1.46 to 2.7.
     # courant_strained_first: when strains lacked (dt grad v)^2, a ball of 3 cells radius gained 46
-    # % in 200/c with usf and the longer step, 1 % with 0.9 h/c. This has not been measured since.
+    # % in 200/c with usf and the longer step, 1 % with 0.9 h/c. The ball has not been measured
+    # again since.
     traits = BasisTraits(
         cells=3,
         least_nodes=4,

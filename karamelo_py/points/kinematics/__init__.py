@@ -368,7 +368,7 @@ class SymmetricTensor(Matrix):
         """Return R s R^T with the rotation R of the increment (Jaumann, objective).
 
         R rotates about w = axial(skew(dl)) by Cayley's formula with tan(|w|/2) ~ |w|/2 (1 +
-        |w|^2/12). It is orthogonal to round-off, with angle error |w|^5/120 (Hughes & Winget 1980,
+        |w|^2/12). R is orthogonal to round-off, with angle error |w|^5/120 (Hughes & Winget 1980,
         without the second term: |w|^3/12). A `LargeIncrement` has two more terms.
         """
         if self.kin.dimension == 1:

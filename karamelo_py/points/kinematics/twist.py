@@ -1,9 +1,9 @@
 """Axisymmetric bodies that twist: a velocity around the axis, and its shears.
 
-Axes 1, 2, 3 are along the radius, along the axis, and around it. They rotate around the axis with
-each point, so that rigid rotation causes no strain. Tensors have the components of 3D in another
-order. In velocity gradient and F, components 13 and 23 are 0; with angular velocity w and rotation
-phi, 31 and 32 are r dw/dr and r dw/dz in the gradient, r dphi/dR and r dphi/dZ in F.
+Axes 1, 2, 3 are along the radius, along the axis, and around it. These axes rotate around the axis
+of symmetry with each point, so that rigid rotation causes no strain. Tensors have the components of
+3D in another order. In velocity gradient and F, components 13 and 23 are 0; with angular velocity w
+and rotation phi, 31 and 32 are r dw/dr and r dw/dz in the gradient, r dphi/dR and r dphi/dZ in F.
 """
 
 from karamelo_py.compiler import algebra, real

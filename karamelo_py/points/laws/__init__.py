@@ -163,7 +163,8 @@ _columns: dict[type, dict[str, NamedTuple] | None] = {}
 def column(component: type, name: str, source: Callable | NamedTuple | None = None) -> None:
     """Declare an output column by a `number` or a tag of `shown`; by default, a field of the state.
 
-    Derived classes inherit it. Laws with a `dissipated_energy` also have the column `dissipated`.
+    Derived classes inherit the column. Laws with a `dissipated_energy` also have the column
+    `dissipated`.
     """
     if source is None:
         source = _by_field(name)

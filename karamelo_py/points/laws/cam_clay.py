@@ -190,8 +190,8 @@ _NEWTON = 4
 def plastic_flow(law, q, p, pc):
     """Return the y and w by which a trial with q and p returns to the surface; 0 inside it.
 
-    With (1 + w) = q / q_s, where q_s is on the surface, one equation for y remains. Its solution
-    lies between y = 0 (or p = pc, if larger) and the critical state 2 p = pc.
+    With (1 + w) = q / q_s, where q_s is on the surface, one equation for y remains. The solution of
+    this equation lies between y = 0 (or p = pc, if larger) and the critical state 2 p = pc.
     """
     yields = q * q / law.M**2 + p * (p - pc) > 0
     q = where(yields, q, law.M * pc)  # unused lanes get a value outside the surface

@@ -36,8 +36,8 @@ class LinearConstants(NamedTuple):
     nu
         Poisson's ratio, above -1 and below 0.5.
     cp, kappa
-        Heat capacity per unit mass, and conductivity; both or neither. They add a temperature,
-        initially the solid's.
+        Heat capacity per unit mass, and conductivity; both or neither. With both, points have a
+        temperature, initially the solid's.
     alpha
         Coefficient of linear expansion.
     rate

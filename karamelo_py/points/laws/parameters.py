@@ -92,7 +92,8 @@ def reference_rate(epsdot0: float, factor: float, name: str) -> float:
 class Numbers:
     """Constant sequence of numbers (a curve or a formula), an array in kernels.
 
-    Tables of several laws pad it with its last number; laws that need the length store it.
+    Tables of several laws pad the sequence with its last number; laws that need the length store
+    the length.
     """
 
     values: tuple[float, ...]

@@ -43,7 +43,8 @@ class TulerButcher(NamedTuple):
     -----
     A point fails when the integral of (s1 - sigma0)^exponent over time reaches K, with the largest
     principal stress s1 of intact material (Tuler & Butcher 1968, Int. J. Fract. Mech. 4, 431-437).
-    It then sustains pressure only. Dump columns: damage, and damage_init, the integral / K.
+    A point that has failed sustains pressure only. Dump columns: damage, and damage_init, the
+    integral / K.
 
     See Also
     --------

@@ -1,7 +1,7 @@
 """Temperature of a point as changed by its law, a part of `eos_strength`.
 
-A temperature is a NamedTuple of parameters. Its history is `Warm`, which other parts get as `heat`;
-without a temperature they get ().
+A temperature is a NamedTuple of parameters. The history of a temperature is `Warm`, which other
+parts get as `heat`; without a temperature they get ().
 """
 
 from typing import Annotated, NamedTuple

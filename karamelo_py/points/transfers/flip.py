@@ -44,7 +44,7 @@ class FLIP(NamedTuple):
     alpha
         FLIP coefficient.
     variant
-        Also map the velocity gradient: TFLIP.
+        Also map the velocity gradient from points to nodes: TFLIP.
 
     Example
     -------

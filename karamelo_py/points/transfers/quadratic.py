@@ -1,9 +1,10 @@
 """PolyPIC/quadratic: points store a quadratic velocity field, with cubic splines.
 
-Around a point it is v + C r + sum_m c_m q_m(r), r = X - x, with the modes q = r_i r_j and, in each
-direction, r^2 - (m3/m2) r - m2, where m_n = sum_I N_I (X_I - x)^n along a line of nodes. These are
-orthogonal under the weights N_I, so only v and C have momentum and angular momentum (Fu, Guo, Gast,
-Jiang & Teran 2017, "A polynomial particle-in-cell method", section 4; modes up to degree 2).
+Around a point the velocity is v + C r + sum_m c_m q_m(r), r = X - x, with the modes q = r_i r_j
+and, in each direction, r^2 - (m3/m2) r - m2, where m_n = sum_I N_I (X_I - x)^n along a line of
+nodes. These are orthogonal under the weights N_I, so only v and C have momentum and angular
+momentum (Fu, Guo, Gast, Jiang & Teran 2017, "A polynomial particle-in-cell method", section 4;
+modes up to degree 2).
 """
 
 from typing import Any, NamedTuple
@@ -40,9 +41,9 @@ class QuadraticModes(Moment):
 class PolyPICQuadratic(NamedTuple):
     """PolyPIC with a quadratic velocity field around each point (6 modes in 2D, 10 in 3D).
 
-    Use PolyPIC/quadratic with cubic splines. It damps vortices and vibrations less than APIC: with
-    20 cells, the velocities of `inputs/defaults/in.taylor_green` err by 2 %, with APIC by 7 %.
-    Liquids take shorter steps, as splashes gain energy otherwise.
+    Use PolyPIC/quadratic with cubic splines. PolyPIC/quadratic damps vortices and vibrations less
+    than APIC: with 20 cells, the velocities of `inputs/defaults/in.taylor_green` err by 2 %, with
+    APIC by 7 %. Liquids take shorter steps, as splashes gain energy otherwise.
 
     Example
     -------

@@ -106,7 +106,7 @@ def _by_arms_mls(transfer, inverse_d):
     return inverse_d
 
 
-# C is the velocity gradient except for the hoop part, and is gathered once if both use v*.
+# C is the velocity gradient except for the hoop part; one gather serves both if both use v*.
 
 
 @transfers.forces_by_arms.on(MLS)

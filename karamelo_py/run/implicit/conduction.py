@@ -15,10 +15,10 @@ from karamelo_py.scene.modify import Fix
 def conduct(equations: Equations, hooks: Tag, fixes: list[Fix], dt: float) -> None:
     """Conduct heat for `dt`, before the points are strained; raises `Singular`.
 
-    The equation is C (T' - T) / dt = q - K T', with nodal capacities C and conductances K. It is
-    linear, so it is solved once, without iterations. The split from an adiabatic step has an error
-    of first order in dt (Armero & Simo 1992). Conduction precedes the stress update, so that load
-    steps end in equilibrium.
+    The equation is C (T' - T) / dt = q - K T', with nodal capacities C and conductances K. The
+    equation is linear, so it is solved once, without iterations. The split from an adiabatic step
+    has an error of first order in dt (Armero & Simo 1992). Conduction precedes the stress update,
+    so that load steps end in equilibrium.
     """
     s, mode = equations.s, equations.mode
     take_rows(FLOW_TO_NODES, s, mode, hooks)

@@ -166,7 +166,7 @@ class Contact:
     def stopped(self, v: np.ndarray, inverse: np.ndarray) -> np.ndarray:
         """Return `v` (m, d) without the relative normal velocities of pairs under pressure.
 
-        This conserves momentum; `inverse` (m, d) are inverse masses, 0 at held nodes.
+        The change conserves momentum; `inverse` (m, d) are inverse masses, 0 at held nodes.
         """
         return v + inverse * self._stopping(v, inverse, self._across()[self.pressed])
 

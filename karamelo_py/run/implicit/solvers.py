@@ -82,10 +82,10 @@ def amg(
 ) -> np.ndarray:
     """Solve by conjugate gradients (GMRES if A is not symmetric) with algebraic multigrid.
 
-    `rigid` are the rigid motions (n, k) of the unknowns, 0 for decoupled ones. They are the near
-    null space for smoothed aggregation (Vanek, Mandel & Brezina 1996). `accuracy` is the tolerance
-    for |residual| / |b|. Most of the time is spent building the hierarchy, so it is stored in
-    `kept` and reused for similar matrices while few iterations are needed.
+    `rigid` are the rigid motions (n, k) of the unknowns, 0 for decoupled ones. The rigid motions
+    are the near null space for smoothed aggregation (Vanek, Mandel & Brezina 1996). `accuracy` is
+    the tolerance for |residual| / |b|. Most of the time is spent building the hierarchy, so it is
+    stored in `kept` and reused for similar matrices while few iterations are needed.
     """
     import pyamg
 

@@ -48,7 +48,7 @@ def _model(path: Path) -> Iterator[ModuleType]:
 def begin(gmsh: ModuleType) -> None:
     """Initialize Gmsh, but undo its reset of SIGPIPE.
 
-    Otherwise closing a pipe, or the live page, would end the program.
+    With the reset, closing a pipe, or the live page, would end the program.
     """
     before = signal.getsignal(signal.SIGPIPE) if hasattr(signal, "SIGPIPE") else None
     gmsh.initialize([], readConfigFiles=False, run=False, interruptible=False)

@@ -156,10 +156,7 @@ def skin_of(points: np.ndarray, triangles: np.ndarray, tolerance: float) -> Skin
 
 
 def _closed(points: np.ndarray, triangles: np.ndarray) -> np.ndarray:
-    """Merge equal vertices, and drop triangles that become degenerate.
-
-    Raises ScriptError if the surface is open.
-    """
+    """Merge equal vertices, drop degenerate triangles; raises ScriptError for an open surface."""
     size = np.ptp(points, axis=0).max()
     for spacing in (0.0, _WELD * size):
         same = points if spacing == 0 else np.rint(points / spacing)

@@ -245,10 +245,7 @@ def _by_meshio(path: Path, file_format: str | None = None, why: str | None = Non
 
 
 def points_of(path: Path) -> np.ndarray:
-    """Read the points (n, 3) of a cloud or a mesh.
-
-    Raises ScriptError if meshio cannot read them.
-    """
+    """Read the points (n, 3) of a cloud or mesh; raises ScriptError if meshio cannot read them."""
     return _by_meshio(path).points
 
 

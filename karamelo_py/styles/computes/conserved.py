@@ -121,8 +121,8 @@ class LostByContact(Compute):
     the mean of the approach velocities before and after the step; friction dissipates the
     tangential impulse times the mean sliding velocity. The sum is the work done by free rigid
     bodies and by bodies that contact does not move, minus the work done on points. The sum is exact
-    with FLIP 1 in musl and usavg. It includes damping and friction of contact/surface and
-    contact/rigid_body, but not load steps. The group must be all points.
+    with FLIP 1 in musl and usavg. Damping and friction of contact/surface and contact/rigid_body
+    are included, load steps are not. The group must be all points.
 
     See Also
     --------
@@ -166,10 +166,10 @@ class LostByTransfer(Energy):
     Notes
     -----
     Nodal impulses do work on a point, with the mean of its velocities before and after a step. The
-    loss is this work minus the change of m v^2 / 2. It is negative while points get energy back
-    from the moments that they store (APIC): m v^2 / 2 does not include the energy of moments. With
-    usl the loss includes the damping of the scheme. The energy of gases, which take it up as heat,
-    of soil with pore water and of deleted points is not counted.
+    loss is this work minus the change of m v^2 / 2. The loss is negative while points get energy
+    back from the moments that they store (APIC): m v^2 / 2 does not include the energy of moments.
+    With usl the loss includes the damping of the scheme. The energy of gases, which take it up as
+    heat, of soil with pore water and of deleted points is not counted.
 
     PIC and FLIP below 1 with musl or usavg are always counted. Otherwise this compute makes steps
     10 to 20 % slower.

@@ -274,8 +274,8 @@ def _numbers(bits: np.ndarray) -> np.ndarray:
 class Probe(Mean):
     """Measure columns of the points, such as a stress: means, or values at one point.
 
-    The value is published as ID, or as ID_column if there are several columns. It is NaN for an
-    empty group, and for a point that no longer exists.
+    The value is published as ID, or as ID_column if there are several columns. The value is NaN for
+    an empty group, and for a point that no longer exists.
 
     Parameters
     ----------

@@ -135,9 +135,9 @@ class GroundMotion(VelocityNodes):
 
     Notes
     -----
-    Accelerations from a file are interpolated linearly in time and 0 after the last row. They are
-    integrated from rest; if the final velocity of the record is not 0, the base remains in motion.
-    A rigid base reflects all waves that reach it.
+    Accelerations from a file are interpolated linearly in time and 0 after the last row.
+    Accelerations are integrated from rest; if the final velocity of the record is not 0, the base
+    remains in motion. A rigid base reflects all waves that reach it.
 
     With `through`, waves enter and leave through the edge. The record is then the outcrop motion of
     rock, twice the incoming wave (Joyner & Chen 1975): its velocity v is applied as the traction

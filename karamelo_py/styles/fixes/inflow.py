@@ -41,7 +41,8 @@ class Inflow(VelocityNodes):
     Parameters
     ----------
     solid
-        The solid that fills the inlet, at least one cell long. Its layers of points enter first.
+        The solid that fills the inlet, at least one cell long. The layers of points in the inlet
+        enter first.
     velocity
         vx, vy, vz, one per dimension; exactly one of them is not 0.
     until

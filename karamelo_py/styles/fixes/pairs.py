@@ -65,7 +65,7 @@ class PairContact(Gripping):
     def law(self) -> NamedTuple:
         """Return the tag of the force law between two points (:mod:`karamelo_py.points.bodies`).
 
-        It is called in each step, since constants may change between runs.
+        The method is called in each step, since constants may change between runs.
         """
         raise NotImplementedError
 

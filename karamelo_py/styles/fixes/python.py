@@ -83,9 +83,9 @@ class Python(Fix):
     Notes
     -----
     The function gets a view of the group: dt, time, and arrays with a row per member (position,
-    velocity, mass, force ...; see the page on plug-ins). The function may change these arrays. Its
-    return value is published: a number as ID, up to three numbers as ID_x, ID_y, ID_z. A call costs
-    about ten microseconds.
+    velocity, mass, force ...; see the page on plug-ins). The function may change these arrays. The
+    return value of the function is published: a number as ID, up to three numbers as ID_x, ID_y,
+    ID_z. A call costs about ten microseconds.
 
     With several processes, all points are gathered in each step, which is slow. If a function
     ``pull`` treats each point or node separately and moves no points, set ``pull.point_by_point =

@@ -35,7 +35,7 @@ def prescribe_at_most(node):
 
 
 def prescribe_mapped_at_most(node):
-    """Bound v, too. Otherwise stress does spurious work, and a rebound gains 50 % of the energy."""
+    """Bound v, too: else stress does spurious work, and a rebound gains 50 % of the energy."""
     allowed = node.value if node.v_star == node.value else min(node.v, node.value)
     return allowed, allowed, node.force, 0.0
 
@@ -250,7 +250,8 @@ class Reaction(Compute):
     Parameters
     ----------
     group
-        Group of nodes, or ``all``. It must include all or no nodes of each fix velocity_nodes.
+        Group of nodes, or ``all``. The group must include all or no nodes of each fix
+        velocity_nodes.
 
     Example
     -------

@@ -151,7 +151,7 @@ def _conflicts(fix: Any, simulation: Any) -> Iterator[dict[str, Any]]:
         axes, shared = unlike(other, fix), _shared(simulation, other, fix)
         if axes and len(shared):
             yield _said(other, axes, shared)
-    # It is intended if all points have a velocity, and some then get another one.
+    # A velocity of all points, followed by another velocity for some of them, is intended.
     for other in first[: first.index(fix)] if fix in first else first:
         axes, shared = unlike(other, fix), _shared(simulation, other, fix)
         if axes and 0 < len(shared) == len(simulation.points.members(other.group)):

@@ -74,10 +74,10 @@ class ULMPMContacts(Method):
 
     The gap at a node is computed from the mean position of the points around it, assuming that the
     outermost points are half their size below the surface (Nairn 2013, "Modeling imperfect
-    interfaces in the material point method using multimaterial methods"). This is exact for plane
-    surfaces along the grid. Solids with curved or inclined faces have cut points (points=cut) by
-    default, since whole squares make it stair-stepped, and a block on a slope of 20 degrees sticks.
-    With bernstein-quadratic, contact begins as soon as two solids have mass at one node.
+    interfaces in the material point method using multimaterial methods"). The gap is exact for
+    plane surfaces along the grid. Solids with curved or inclined faces have cut points (points=cut)
+    by default, since whole squares make it stair-stepped, and a block on a slope of 20 degrees
+    sticks. With bernstein-quadratic, contact begins as soon as two solids have mass at one node.
 
     Contact is inelastic at the nodes of a surface: colliding bars of 4, 8 and 16 cells lose 15, 11
     and 4 % of the kinetic energy. The summary of a run names this energy (``lost by contact``), as

@@ -63,8 +63,8 @@ class ShockConstants(NamedTuple):
     unless a damage releases it.
 
     In compression, with the rate of volume change d < 0, cell size h and speed of sound c, the
-    viscous pressure is rho h (Q1 h d^2 - Q2 c d) (von Neumann & Richtmyer 1950; Landshoff 1955). It
-    spreads shocks over a few cells, and shortens the time step.
+    viscous pressure is rho h (Q1 h d^2 - Q2 c d) (von Neumann & Richtmyer 1950; Landshoff 1955).
+    Viscosity spreads shocks over a few cells, and shortens the time step.
 
     See Also
     --------

@@ -150,9 +150,9 @@ class Concrete(NamedTuple):
     The von Mises stress is at most fc (A (1 - D) + B P*^N) (1 + C ln(rate/epsdot0)), and at most
     smax fc; in tension it decreases to 0 at a pressure of -T (1 - D). D sums plastic strain and,
     with eos p-alpha, the volume strain of crushed pores, both divided by the strain to failure
-    (Holmquist, Johnson & Cook 1993, 14th Int. Symp. Ballistics, 591-600). Their three-part pressure
-    curve is not built in: use eos p-alpha, which has the same parts, or eos formula. Dump columns:
-    ep, damage, opened (the volume ratio of gaps).
+    (Holmquist, Johnson & Cook 1993, 14th Int. Symp. Ballistics, 591-600). The three-part pressure
+    curve of these authors is not built in: use eos p-alpha, which has the same parts, or eos
+    formula. Dump columns: ep, damage, opened (the volume ratio of gaps).
 
     See Also
     --------

@@ -43,8 +43,9 @@ class ContactSurface(StiffTool):
     Parameters
     ----------
     region
-        ID of the region. It must have an inside: a mesh of solid elements (in 2D of area elements),
-        a closed STL surface, or a plane. With the word ``exterior`` the region is a mould.
+        ID of the region. The region must have an inside: a mesh of solid elements (in 2D of area
+        elements), a closed STL surface, or a plane. With the word ``exterior`` the region is a
+        mould.
     mu
         Coefficient of friction (Coulomb).
     way

@@ -29,10 +29,10 @@ class IndentMinimizePenetration(StiffTool, BallTool):
 
     Notes
     -----
-    Each point is a sphere (a disk in 2D). Its diameter 2 rp is the edge of a cube of its present
-    volume. A point at the distance r from the centre, with the overlap p = R + rp - r > 0, gets the
-    force m p / dt^2, which moves a free point out of the ball within one step. Friction and dt are
-    as in contact/minimize_penetration (de Vaucorbeil & Nguyen 2021).
+    Each point is a sphere (a disk in 2D). The diameter 2 rp is the edge of a cube of the point's
+    present volume. A point at the distance r from the centre, with the overlap p = R + rp - r > 0,
+    gets the force m p / dt^2, which moves a free point out of the ball within one step. Friction
+    and dt are as in contact/minimize_penetration (de Vaucorbeil & Nguyen 2021).
 
     Publishes the force on the points as ID_x, ID_y, ID_z, and the contact area as ID_s: one face of
     the cube of each touching point.
