@@ -227,7 +227,7 @@ def test_threads_that_are_not_there_are_told_of_the_option(run_interpreted):
         ("in.a --quiet=3", "'3'\nexpected: --quiet\n"),
         ("in.a -var E", "-var: expected 2 arguments\nexpected: -var NAME VALUE\n"),
         ("in.a -out in.b", "cannot write to in.b: it is a file\n"),
-        ("in.a in.b", "one word too many: in.b"),
+        ("in.a in.b", "unexpected word: in.b"),
         ("in.a --ranks 100000", "--ranks 100000: this machine has"),
         ("check", "expected: karamelo-py check SCRIPT"),
         ("run", "expected: karamelo-py SCRIPT"),
@@ -249,7 +249,7 @@ def test_threads_that_are_not_there_are_told_of_the_option(run_interpreted):
         ("live in.a", "did you mean 'karamelo-py SCRIPT --live'?"),
         ("help vonmises", "hint: the column seq of dumps and pictures"),
         ("in.a -restart r.2.h5 r.10.h5 r.7.h5", "there is no file r.10.h5"),
-        ("in.a -restart r.2.h5 in.b", "one word too many: in.b"),
+        ("in.a -restart r.2.h5 in.b", "unexpected word: in.b"),
         ("in.a -in in.b", "two scripts: in.a and in.b"),
     ],
 )  # fmt: skip

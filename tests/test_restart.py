@@ -306,10 +306,10 @@ def test_variables_of_the_command_line(run_interpreted):
 @pytest.mark.parametrize(
     ("old", "new", "says"),
     [
-        ("100, 0.3", "100, 0.2", "this statement was material(rubber,linear,2,100,0.3) there"),
-        ("run(4)", "", "this one ends before"),
-        ("run(4)", "region(r, block, 0, 1, 0, 1)", "there, this statement was a run"),
-        ("FLIP, linear, 1", "FLIP, linear, 0.9", "this statement was method("),
+        ("100, 0.3", "100, 0.2", "that script has material(rubber,linear,2,100,0.3) here"),
+        ("run(4)", "", "this script ends earlier"),
+        ("run(4)", "region(r, block, 0, 1, 0, 1)", "that script has a run here"),
+        ("FLIP, linear, 1", "FLIP, linear, 0.9", "that script has method("),
     ],
 )
 def test_another_script(run_interpreted, old, new, says):

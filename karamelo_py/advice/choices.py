@@ -141,14 +141,14 @@ CHOICES = (
         lambda s: s.shocked and not s.elastic_only,
         ("method({grid}, APIC, cubic-spline)",),
         "a shock",
-        "FLIP oscillates after it, and other bases lose pressure where stressed points cross cells",
+        "FLIP oscillates after shocks; other bases lose pressure where stressed points cross cells",
         ("in.plates", "in.flyer"),
     ),
     Choice(
         lambda s: not s.elastic_only and s.alone and s.narrow,
         ("method(tlmpm, APIC, linear)",),
         "a sheet or rod of metal that flows",
-        "it does not lock, and APIC does not oscillate after waves",
+        "thin metal does not lock, and APIC does not oscillate after waves",
         ("in.impact", "in.plastic_wave"),
     ),
     Choice(

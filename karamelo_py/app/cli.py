@@ -232,7 +232,7 @@ def _surplus(arguments: list[str], words: list[str], parser: CommandLine) -> Scr
     elif not option and VARIABLE[0] in arguments and "-jobs" in parser.options():
         hint = f"-var NAME={words[0]}, in one word"
     return ScriptError(
-        f"there is no option {option}" if option else f"one word too many: {words[0]}",
+        f"there is no option {option}" if option else f"unexpected word: {words[0]}",
         expected=USAGE if command == "run" else parser.plain_usage(),
         hint=hint,
     )

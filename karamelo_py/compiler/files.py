@@ -54,7 +54,7 @@ def read(path: Path) -> bytes:
         _refuse_of_others(os.fstat(file.fileno()))
         data = file.read()
     if hashlib.sha256(data[32:]).digest() != data[:32]:
-        raise ValueError("not what was written")
+        raise ValueError("the checksum is wrong")
     return data[32:]
 
 

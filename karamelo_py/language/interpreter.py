@@ -161,7 +161,7 @@ class Interpreter:
             self.frames.clear()
             raise
         if self.replay is not None:
-            raise self.replay.other_script("this one ends before")
+            raise self.replay.other_script("this script ends earlier")
 
     def _finish(self) -> None:
         while self.frames:
@@ -228,7 +228,7 @@ class Interpreter:
         last = replay.at_end
         self._execute(statement)
         if last and self.replay is replay:
-            raise replay.other_script("there, this statement was a run", statement.mark)
+            raise replay.other_script("that script has a run here", statement.mark)
 
     def _including(self, depth: int) -> list[Mark]:
         frames = self.frames[:depth]

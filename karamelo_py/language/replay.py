@@ -53,7 +53,7 @@ class Replay:
         if text != before and not (self.at_end and self.within):
             if text.partition("(")[0] == before.partition("(")[0] in _RUNS:
                 raise self._was_over(before, mark)
-            error = self.other_script(f"this statement was {before} there", mark)
+            error = self.other_script(f"that script has {before} here", mark)
             error.hint = self._longer_by(before, text) or error.hint
             raise error
 

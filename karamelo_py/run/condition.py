@@ -21,7 +21,7 @@ class RunCondition(NamedTuple):
             lost = sorted(name for name in self.formula.names if isnan(values.get(name)))
             raise ScriptError(
                 f"step {hub.update.step}: the run condition is not a number: "
-                + (f"{lost[0]} is NaN" if lost else "a part of it is NaN"),
+                + (f"{lost[0]} is NaN" if lost else "a term of the condition is NaN"),
                 expected="values that are numbers at every step",
             )
         return bool(holds) != self.until

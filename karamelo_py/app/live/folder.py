@@ -117,7 +117,7 @@ class FolderPage:
         ]
         news: dict[str, Any] = {
             "rows": rows, "frames": listed, "flags": [], "paused": False,
-            "unwatched": "the page of a run has it, not a log",
+            "unwatched": "shown on the page of a run; a log does not contain it",
         }  # fmt: skip
         if not seen:
             news["about"] = {

@@ -266,8 +266,7 @@ def tell(family: Family, *, costs: bool) -> None:
     together = made.get("timed") is False and made.get("jobs") != 1
     if costs and family.cost in ("seconds", "wall_s") and together:
         print(
-            "note: these runs went side by side, their times disturb each other; "
-            "sweep -time measures"
+            "note: these runs ran at the same time, which affects their times; sweep -time measures"
         )
 
 

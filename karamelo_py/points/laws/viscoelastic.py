@@ -214,7 +214,7 @@ known_failure(
     "short relaxation times",
     when=_too_short,
     reason="the relaxation time {part.tau:.4g} of material '{owner.id}' is below the time step, "
-    "{dt:.4g}: that part of the stress never acts",
+    "{dt:.4g}: the stress with this time never acts",
     cure="leave the term out, with a softer elastic law",
 )
 

@@ -353,9 +353,7 @@ def check_numbers(simulation: SceneState, arrays: ArraysByName) -> None:
         for first in range(0, len(array), PIECE):
             some = array[first : first + PIECE]
             if some.min() < 0 or some.max() >= end:
-                raise _misfit(
-                    f"{name} has {some.min()} to {some.max()}, and is from 0 to {end - 1}"
-                )
+                raise _misfit(f"{name} has {some.min()} to {some.max()}, expected 0 to {end - 1}")
 
 
 def remembered_at(simulation: SceneState, spans: np.ndarray) -> list[np.ndarray]:
