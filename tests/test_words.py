@@ -43,6 +43,11 @@ EXPRESSIONS = {
     r"stands?": ("is, appears", 0, 0),
     r"go(?:es)? on": ("continues", 0, 0),
     r"cures?|remed(?:y|ies)": ("fix", 0, 1),
+    r"(?:and|or) the like": ("name the others", 0, 0),
+    r"for good": ("permanently; dissipated", 0, 0),
+    r"anew": ("again, from zero, empty", 0, 0),
+    r"further ones": ("others, later ones", 0, 0),
+    r"in company|fates?": ("outcome", 0, 0),
 }
 
 

@@ -67,7 +67,7 @@ def _flat(hub: Hub, held: dict[int, Roller]) -> Words:
     for k in range(free_from(domain.kin), d):
         rest = [axis for axis in range(d) if axis != k]
         layers, faces = _layers(hub, k, rest) if _moves_nothing(hub, [k]) else NO_LAYERS
-        # Points of a radial scene cost as much, so one or two layers waste nothing.
+        # A radial scene would cost as much as one or two layers of points.
         if layers > (2 if round_ else 0) and _faces_held(hub, k, *faces):
             several = [axis for axis in rest if axis not in counts]
             if several and acts_alike(hub, several):

@@ -129,7 +129,7 @@ class Narrator(Listener):
             update.warned_of_bounces = True
             hub.warn(
                 f"by step {simulation.step}, time {simulation.time:.6g}, points were reflected "
-                "at the edge of the domain; further ones are only counted",
+                "at the edge of the domain; later reflections are only counted",
                 mark=update.boundary_mark,
             )
 

@@ -28,7 +28,7 @@ def last_step_size(s: Setup) -> Number:
 def kick(s: Setup) -> Number:
     """Return the time for which forces act, between the middles of the last and this step.
 
-    In the first step it is dt (initial velocities are half a step old), or dt / 2 (start=half).
+    The first step returns dt (initial velocities are half a step old), or dt / 2 (start=half).
     """
     return real(s.control.step[0].kick, s.nodes.sums[0, MASS])
 

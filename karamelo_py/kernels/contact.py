@@ -60,9 +60,9 @@ from karamelo_py.points.basis.surface import ENTRIES
 from karamelo_py.points.grid import node_position
 from karamelo_py.points.kinematics import dot, vector, zero_vector
 
-# Squared sine of the scatter of a body's outward directions about their mean:
-SCATTER = 0.003  # scatter of a plane face
-EDGE = 0.03  # scatter above which a face ends or is round
+# Mean squared sine of the angle between a body's outward directions and their mean:
+SCATTER = 0.003  # at a plane face
+EDGE = 0.03  # above which a face ends or is round
 FACING = 0.3  # directions with a larger cosine count as the same
 FULL = 1.05  # filled fraction of the cells around a node above which a liquid has no gap
 MEMORY = 100  # steps after a contact in which bodies without a firm surface approach a wall slowly

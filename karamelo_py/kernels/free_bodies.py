@@ -58,7 +58,7 @@ def free_way(shape, kin, x, reach, side):
     """Return the distance to the surface, up to `reach`, the side and the nearest face.
 
     The distance is 0 if it cannot save later searches. The side is 1 inside, -1 outside; `side` is
-    the last one if no face was in the way since then, else 0.
+    the last one if no face has blocked the path since then, else 0.
     """
     return 0.0, 0.0, -1
 

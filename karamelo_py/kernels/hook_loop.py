@@ -167,7 +167,7 @@ def _act_on_parts(members, task, call, k):
     mine_call = Call(here, mine, call.dt, h, call.share)
     _act_on_part(members, task, mine_call, k, hooks.apart.chosen.shape[0])
     totals.hand_over(private.totals, control.totals, totals.WORK)
-    # Totals of other hooks that have held these nodes change, too.
+    # The totals of other hooks that prescribe these nodes change, too.
     several = hooks.holders.size > 0
     for other in range(0 if several else h, len(hooks.table) if several else h + 1):
         first, count = _published(hooks, other)

@@ -227,7 +227,7 @@ NODE_WORDS = {
         members, members.nodes.sums, n, arrays.of_force(members.kin)
     ),
 }
-# What hooks on whole nodes can change, in addition to fields.
+# Nodal arrays that hooks on whole nodes can change, in addition to fields, by stage.
 NODE_WRITES = {"post_particles_to_grid": "force", "post_update_grid_state": "velocity_update"}
 
 

@@ -38,8 +38,8 @@ def points_from(lanes: Tag, q: int, end: int) -> Index:
 def one_loop_each(lanes: Tag, visit: Any) -> bool:
     """Return True if gather, update and scatter get separate loops over a stretch of points.
 
-    Separate loops are faster for passes in lanes that only strain, as a law may fill the
-    instruction cache. If points move, the update is short, and computing stencils twice costs more.
+    Separate loops are faster if all tasks update strains or seepage, as a material law may fill
+    the instruction cache. If points move, computing stencils twice would cost more.
     """
     strains = [isinstance(task, Strain | Seep) for task in visit.tasks]
     return not isinstance(lanes, OneByOne) and any(strains) and all(strains)

@@ -567,7 +567,7 @@ MOMENTUM_AGAIN = (
 
 
 def shown_sums(rows: Iterable[Any]) -> tuple:
-    """List the quantities of `SUMS`, and further ones that a scheme scatters before points move."""
+    """List the quantities of `SUMS`, and those a scheme also scatters before points move."""
     by_class = {type(one): one for one in SUMS.quantities}
     for row in rows:
         if isinstance(row, Gather) and isinstance(row.task, Move):

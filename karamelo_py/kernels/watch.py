@@ -106,7 +106,7 @@ MORE = VelocityAround, RelativeVelocity, WorkOfForces
 
 
 def more_of(block):
-    """Return law and fields of points with further kinds of energy or work, or empty tuples."""
+    """Return the law and the fields that add kinds of energy or work, or empty tuples."""
     law = block.laws if isinstance(block.laws, (Across, Saturated)) else ()
     return law, tuple([one for one in block.points.fields if type(one) in MORE])
 

@@ -1,4 +1,4 @@
-"""Commands and styles: styles.toml lists the built-in ones, packages provide further ones.
+"""Commands and styles: styles.toml lists the built-in ones, packages provide others.
 
 A package offers a style in its pyproject.toml::
 

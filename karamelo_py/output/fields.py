@@ -134,7 +134,7 @@ class Fields(PointTable):
     def added_up(self, owner: Grouped, name: str = "terms", *arguments: object) -> np.ndarray:
         """Sum terms exactly over the points in the group of `owner`.
 
-        ``owner.name(points, *arguments)`` is called with tables of some points. It returns either
+        ``owner.name(points, *arguments)`` is called with tables of some points. The method returns
         terms (k, n) of k sums, or three values: the number of sums, the index (n,) of the sum to
         which each term belongs, and terms (n,).
         """

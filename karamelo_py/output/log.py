@@ -169,5 +169,5 @@ def _row(cells: list[str], widths: list[int]) -> str:
 
 def begins_anew(path: Path) -> str:
     if not path.is_file():
-        return f"the resumed run left no {path}: it begins anew"
-    return f"{path} has changed since the resumed run: it begins anew"
+        return f"the resumed run left no {path}: the file starts empty"
+    return f"{path} has changed since the resumed run: the file starts empty"

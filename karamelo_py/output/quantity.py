@@ -84,7 +84,7 @@ class Quantity:
             self.hub.warn(
                 f"{self.heading} is NaN, which is not a number, from step "
                 f"{self.hub.update.step} on",
-                hint="a quotient 0/0, the root of a number below 0, or the like",
+                hint="causes are a quotient 0/0, or the root of a number below 0",
             )
         return number
 

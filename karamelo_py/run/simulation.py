@@ -234,7 +234,7 @@ class Simulation(SceneArrays):
         names = {name for fix in lasting.fixes for name in fix.hooks()}
         self.visits = Staged() if lasting.in_python or names & set(POINT_STAGES) else Fused()
         for fix in self.fixes.once:
-            # This stage is the first of a step, so the fix may act before the first output.
+            # initial_integrate is a step's first stage: the fix may act before the first output.
             self._set_initial(fix)
         self.begun |= set(self.fixes.once)
         rigid = any(solid.rigid for solid in self.hub.solids.values())

@@ -485,7 +485,7 @@ class PointsView(View):
             raise ScriptError(
                 f"'{name}' cannot be set: it follows from other columns",
                 name=name,
-                expected=f"{', '.join(AXES[:d])}, v{', v'.join(AXES[:d])}, s11 and the like, T, "
+                expected=f"{', '.join(AXES[:d])}, v{', v'.join(AXES[:d])}, stresses, T, "
                 "or a column of a field of a part",
             )
         self.write_back()

@@ -29,7 +29,7 @@ def check_characters(text: str) -> None:
         raise Mistake("this is an input file of Abaqus", *first.span(1), "a script", hint)
     if first := _DYNA.match(text):
         hint = (
-            "write the scene anew, as docs/getting-started.md says; solid mesh reads its mesh once "
+            "rewrite the scene, as docs/getting-started.md says; solid mesh reads its mesh once "
             "it is saved as .inp (Abaqus), .bdf (Nastran), .stl or .vtk"
         )
         raise Mistake("this is an input file of LS-DYNA", *first.span(1), "a script", hint)

@@ -130,7 +130,7 @@ class Search:
     def slopes(self, fraction: np.ndarray, both: bool = False) -> np.ndarray:
         """Return derivatives (n, variables), taken towards the middle of the range.
 
-        With `both`, they are central differences.
+        With `both`, the derivatives are central differences.
 
         Raises NoDerivatives if the runs on both sides fail.
         """

@@ -267,7 +267,7 @@ def _content(path: Path) -> bytes | None:
 
 
 def _damaged(path: Path) -> None:
-    files.report(f"a file in {files.folder()} is damaged; the loop in it is compiled anew")
+    files.report(f"a file in {files.folder()} is damaged; its loop is compiled again")
     with contextlib.suppress(OSError):
         path.unlink()
 

@@ -277,7 +277,7 @@ def least_stiffness(law: NamedTuple, path: str, x: float) -> float:
 
 @lru_cache(typed=True)
 def first_instability(law: NamedTuple, turning: bool = False) -> tuple[str, float] | None:
-    """Return the path, and the stretch closest to rest, at which stiffness is lost.
+    """Return the path and stretch, closest to rest, at which the stiffness first vanishes.
 
     A path ends where the energy is not defined, as at the limit of chains. Fibres whose directions
     differ from point to point (`turning`) may enclose any angle.

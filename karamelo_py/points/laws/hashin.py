@@ -46,8 +46,8 @@ class Hashin(NamedTuple):
         Shear strength in planes normal to the fibres, above Y/2.
     angle, tilt, spin
         Rotation of the axes of strength from x, y, z in degrees: by `angle` about z, by `tilt`
-        about the new axis 1, by `spin` about the new axis 3. The elastic material has separate
-        angles; its `axes` apply to both.
+        about the new axis 1, by `spin` about the new axis 3. The angles of the elastic
+        material are separate; its `axes` also rotate these axes.
     residual
         Remaining fraction of the stiffness, above 0 and below 1.
 

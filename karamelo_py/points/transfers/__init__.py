@@ -62,7 +62,7 @@ def in_step(transfer, kept):
 
 @point_function()
 def lost_fractions(transfer, template):
-    """Return the fractions (2,) of energy lost for good in mapping to the nodes, and back.
+    """Return the fractions (2,) of energy dissipated in mapping to the nodes, and back.
 
     Stored moments return the rest. If the function is not defined, the loss is not recorded.
     """

@@ -16,8 +16,8 @@ _SETS = 8  # maximum number of sets of shells that do not overlap
 class Skin:
     """The surface of a shape: sets of faces (m, d, d), each a closed surface.
 
-    A position is inside if a set encloses it or a face is within `tolerance`. With `open`, sets
-    enclose nothing. `odd`: see `Surface`.
+    A position is inside if a set encloses it or a face is within `tolerance`. An `open`
+    shape has no interior. `odd`: see `Surface`.
     """
 
     def __init__(

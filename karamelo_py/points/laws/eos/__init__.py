@@ -80,7 +80,7 @@ def compression_energy(eos, j, memory):
 
 @point_function()
 def ratio_at_pressure(eos, p, heat):
-    """Return the volume ratio at the pressure p, or at the nearest pressure that exists."""
+    """Return the volume ratio at the pressure p, or at the nearest pressure the law reaches."""
 
 
 @point_function(otherwise=True)
