@@ -359,6 +359,9 @@ SCENES = {
         -0.01, "contact/minimize_penetration, a, b, 0.2", "log_modify(custom, step, c_x)", "run(4)",
         d=2, n=2,
     ),
+    "faces that touch": bodies(
+        -0.01, "contact/solids, a, b, 0.2", "log_modify(custom, step, c_x)", "run(4)", d=2, n=2
+    ),
     "Hertz": bodies(
         -0.01, "contact/hertz, a, b", "log_modify(custom, step, c_x)", "run(4)", d=2, n=2
     ),

@@ -62,7 +62,7 @@ def test_no_pair_is_missed(d, overlap):
     bound = TwoBodies(
         x=np.concatenate([x1, x2]), v=np.zeros((n + m, d)), mass=np.ones(n + m),
         radius=np.concatenate([r1, r2]), force=np.zeros((n + m, d)), grip=np.zeros((n + m, 0)),
-        first2=n,
+        face=np.zeros((n + m, 0)), first2=n,
     )  # fmt: skip
     cells = cells_for(n + m)._replace(start=np.zeros(100, np.int64))
     for reach in (spacing, 0.5 * spacing):

@@ -14,8 +14,8 @@ PAGE = Path(__file__).parent.parent.parent / "docs" / "defaults.md"
 HEAD = """# What the defaults do
 
 This table compares scenes that have exact answers with the program's own choices of step, scheme
-and averaging. `python -m comparisons.defaults` writes it. Materials and fixes, such as the contact
-of `in.slope_balls`, are always the script's.
+and averaging. `python -m comparisons.defaults` writes it. Materials and fixes are always the
+script's.
 
 | column | meaning |
 |---|---|

@@ -13,16 +13,18 @@ from karamelo_py.compiler import at_hand, kernel, noinline
 from karamelo_py.compiler.fields import load_vector
 from karamelo_py.kernels.arrays import Tag, vector_at
 from karamelo_py.kernels.rubbing import rubbed
-from karamelo_py.kernels.views import state_at, volume_of
+from karamelo_py.kernels.views import deformation_of, state_at, volume_of
 from karamelo_py.points.bodies import (
     NEW,
-    MinimizePenetration,
+    Face,
+    Hertz,
+    MeetingFaces,
     TouchingPair,
     along,
     force_between,
     radius,
 )
-from karamelo_py.points.kinematics import zero_vector
+from karamelo_py.points.kinematics import inv, zero_vector
 
 
 class TwoBodies(NamedTuple):
@@ -34,6 +36,7 @@ class TwoBodies(NamedTuple):
     radius: np.ndarray  # (n,)
     force: np.ndarray  # (n, d)
     grip: np.ndarray  # (n, d + 2) of the first body (`points.bodies.rub`), or (n, 0)
+    face: np.ndarray  # (n, d + 3) `points.bodies.Face`, or (n, 0)
     first2: int
 
 
@@ -131,6 +134,21 @@ def collect(matter, x, rows, out):
             out[i, 3 + d + k] = points.v[k, p]
 
 
+@kernel
+def turn_faces(frame, matter, rows, faces):
+    """Turn and stretch `faces` (n, d + 3) of the reference shape with the points."""
+    kin, points, laws = at_hand(matter)
+    none = zero_vector(kin, 0.0)
+    for i in range(rows.size):
+        law, state = state_at(kin, points, laws, rows[i])
+        f = deformation_of(frame, kin, points, (law, state), rows[i])
+        normal = inv(f.planar()).transposed() @ vector_at(kin, faces, i, 0, none)
+        size = sqrt(normal.squared())
+        for k in range(kin.dimension):
+            faces[i, k] = normal[k] / size
+        faces[i, kin.dimension] /= size
+
+
 @noinline
 def _range(x, begin, end, k):
     lo, hi = inf, -inf
@@ -215,10 +233,17 @@ def _push_between(push, bodies, i, j):
         squared += dx[k] * dx[k]
     both = bodies.radius[i] + bodies.radius[j]
     if not (near and 0 < squared < both * both):
-        return none
+        return none, 0.0
     radii, masses = (bodies.radius[i], bodies.radius[j]), (bodies.mass[i], bodies.mass[j])
-    pair = TouchingPair(dx, sqrt(squared), radii, masses, push.dt, push.kick)
+    faces = (_face(kin, bodies, i), _face(kin, bodies, j)) if isinstance(law, MeetingFaces) else ()
+    pair = TouchingPair(dx, sqrt(squared), radii, masses, push.dt, push.kick, faces)
     return force_between(law, kin, pair)
+
+
+@noinline
+def _face(kin, bodies, i):
+    normal, d = vector_at(kin, bodies.face, i, 0, zero_vector(kin, 0.0)), kin.dimension
+    return Face(normal, bodies.face[i, d], bodies.face[i, d + 1], bodies.face[i, d + 2])
 
 
 @noinline
@@ -237,17 +262,16 @@ def _touch(push, bodies, cells, i, j):
     velocity over the partners of `i`.
     """
     kin, contact = push.kin, cells.contact
-    force, d = _push_between(push, bodies, i, j), kin.dimension
+    (force, stiffness), d = _push_between(push, bodies, i, j), kin.dimension
     square = force.squared()
     if not square > 0:
         return 0
     _add(bodies, i, j, force, cells.total)
     if bodies.grip.shape[1] == 0:
         return 1
-    none, mass = zero_vector(kin, 0.0), bodies.mass
+    none = zero_vector(kin, 0.0)
     dv = vector_at(kin, bodies.v, j, 0, none) - vector_at(kin, bodies.v, i, 0, none)
-    reduced = mass[i] * mass[j] / (mass[i] + mass[j])
-    slide = reduced / (push.dt * push.kick) * along(dv, force)
+    slide = stiffness * along(dv, force)
     contact[0] += sqrt(square)
     for k in range(d):
         contact[1 + k] += force[k]
@@ -272,7 +296,7 @@ def _rub(push, bodies, i, contact):
 def _pass_on(push, bodies, cells, i, j):
     """Apply a partner's part of the friction of `i`, proportional to its load."""
     kin, contact, d = push.kin, cells.contact, push.kin.dimension
-    square = _push_between(push, bodies, i, j).squared()
+    square = _push_between(push, bodies, i, j)[0].squared()
     if square > 0:
         fraction = sqrt(square) / contact[0]
         force = kin.Vector._make([fraction * contact[1 + d + k] for k in range(d)])
@@ -286,7 +310,7 @@ def push_apart(push, bodies, cells):
     d = push.kin.dimension
     cells.total[:] = 0.0
     touching = 0
-    rubs = isinstance(push.law, MinimizePenetration) and bodies.grip.shape[1] > 0
+    rubs = not isinstance(push.law, Hertz) and bodies.grip.shape[1] > 0
     contact = cells.contact
     width = _lay_cells(d, bodies, cells, push.reach)
     if not width > 0:

@@ -22,6 +22,12 @@ class MinimizePenetration(NamedTuple):
     friction: float
 
 
+class MeetingFaces(NamedTuple):
+    """Removes the overlap of two faces within a step, with Coulomb friction."""
+
+    friction: float
+
+
 def face(kin, volume, x):
     """Return the face area of a cubic point: per unit thickness in 2D, per angle in axisymmetry."""
     if kin.hoops and kin.dimension == 1:
@@ -50,11 +56,21 @@ class TouchingPair(NamedTuple):
     masses: tuple
     dt: Any
     kick: Any
+    faces: tuple = ()  # two `Face`
+
+
+class Face(NamedTuple):
+    """A part of a body's surface next to a point."""
+
+    normal: Any  # outward unit vector
+    near: Any  # distance of the point from the face
+    wide: Any  # width of the face; 0 for points in the interior
+    flat: Any  # 1; 0 next to an edge
 
 
 @point_function()
 def force_between(law, kin, pair):
-    pass
+    """Return the force on the first point, and the stiffness of the pair against slip."""
 
 
 @force_between.on(Hertz)
@@ -63,7 +79,7 @@ def _force_between_hertz(law, kin, pair):
     p = radius1 + radius2 - pair.r
     reduced = radius1 * radius2 / (radius1 + radius2)
     stiffness = 4.0 / 3.0 if kin.dimension == 3 else pi / 4.0
-    return -stiffness * law.modulus * sqrt(reduced * p * p * p) / pair.r * pair.dx
+    return -stiffness * law.modulus * sqrt(reduced * p * p * p) / pair.r * pair.dx, 0.0
 
 
 @force_between.on(MinimizePenetration)
@@ -71,7 +87,29 @@ def _force_between_minimize_penetration(law, kin, pair):
     (radius1, radius2), (mass1, mass2) = pair.radii, pair.masses
     reduced = mass1 * mass2 / (mass1 + mass2)
     p = radius1 + radius2 - pair.r
-    return -reduced * p / (pair.dt * pair.kick) / pair.r * pair.dx
+    force = -reduced * p / (pair.dt * pair.kick) / pair.r * pair.dx
+    return force, reduced / (pair.dt * pair.kick)
+
+
+@force_between.on(MeetingFaces)
+def _force_between_faces(law, kin, pair):
+    (face1, face2), (mass1, mass2) = pair.faces, pair.masses
+    facing = dot(face1.normal, face2.normal) < 0
+    # An edge touches a flat face along the normal of the face.
+    normal = max(face1.flat, 1 - face2.flat) * face1.normal
+    normal = normal - max(face2.flat, 1 - face1.flat) * face2.normal
+    normal = 1 / sqrt(normal.squared() if facing else 1.0) * normal
+    apart = dot(pair.dx, normal)
+    aside = sqrt(max(pair.r * pair.r - apart * apart, 0.0))
+    near1, near2 = face1.near * dot(face1.normal, normal), face2.near * dot(face2.normal, normal)
+    p, narrow = near1 - near2 - apart, min(face1.wide, face2.wide)
+    common = min(0.5 * (face1.wide + face2.wide) - aside, narrow)
+    touching = facing and 0 < p < narrow and common > 0
+    # The widths of a body's faces add up to its surface, so the forces on a face do not depend on
+    # how its points are opposite those of the other body.
+    reduced = mass1 * mass2 / (mass1 + mass2) * common / (narrow if narrow > 0 else 1.0)
+    stiffness = reduced / (pair.dt * pair.kick) if touching else 0.0
+    return -stiffness * p * normal, stiffness
 
 
 class FrictionMemory(NamedTuple):

@@ -42,6 +42,8 @@ class PairContact(Gripping):
     point_fields = (Force, WorkOfForces)
     point_by_point = exerts = True
     conserves = True  # except the work of the forces, which is summed
+    has_faces = False
+    room = 1.0  # distance at which points touch / sum of their radii
 
     def __init__(self, hub: Hub, solid1: Solid, solid2: Solid):
         super().__init__(hub, ParticleGroup(hub, everything=True))
@@ -107,7 +109,7 @@ class PairContact(Gripping):
             x, ids = block.points.x[simulation.now], pairs.OneOfTwo(*self._ranges)
             pairs.extend(Matter(s.kin, block.points, block.laws), x, ids, extents)
         extents = simulation.comm.allreduce_max(extents)
-        width = min(extents[:, 6].sum(), self._reach)
+        width = min(self.room * extents[:, 6].sum(), self._reach)
         low, high = -extents[:, :d].min(axis=0) - width, extents[:, 3 : 3 + d].min(axis=0) + width
         if (low > high).any():
             return None
@@ -116,15 +118,27 @@ class PairContact(Gripping):
             x, rows = block.points.x[simulation.now], np.empty(block.points.id.size, np.int64)
             matter, ids = Matter(s.kin, block.points, block.laws), pairs.OneOfTwo(*self._ranges)
             count = pairs.pick(matter, x, ids, np.stack([low, high]), rows)
-            near.append(rows[:count].copy())
+            near.append(self.at_surface(block, rows[:count]).copy())
         return near
 
-    @staticmethod
-    def _known(simulation: Any, block: Block, rows: np.ndarray, grip: Any) -> np.ndarray:
+    def at_surface(self, block: Block, rows: np.ndarray) -> np.ndarray:
+        """Return the rows of points that may touch the other solid."""
+        return rows
+
+    def faces(self, simulation: Any, block: Block, rows: np.ndarray) -> np.ndarray:
+        """Return `points.bodies.Face` (n, d + 3) of points, or (n, 0)."""
+        return np.empty((len(rows), 0))
+
+    def _known(self, simulation: Any, block: Block, rows: np.ndarray, grip: Any) -> np.ndarray:
         table = np.empty((len(rows), 3 + 2 * simulation.kin.dimension))
         matter = Matter(simulation.kin, block.points, block.laws)
         pairs.collect(matter, block.points.x[simulation.now], rows, table)
-        return table if grip is None else np.concatenate([table, grip[:, rows].T], axis=1)
+        faces = self.faces(simulation, block, rows)
+        if self.has_faces:
+            near, wide = faces[:, -3:-1].T
+            table[:, 2] = np.hypot(near + wide / 2, wide / 2)
+        parts = [table, faces] if grip is None else [table, faces, grip[:, rows].T]
+        return np.concatenate(parts, axis=1)
 
     def _push(
         self, kin: Any, times: tuple[float, float, float], tables: list[np.ndarray]
@@ -137,8 +151,10 @@ class PairContact(Gripping):
         n = len(order)
         of_all = of_all[order]
         _, mass, radius = np.ascontiguousarray(of_all[:, :3].T)
-        x, v, grip = map(np.ascontiguousarray, np.split(of_all[:, 3:], [d, 2 * d], axis=1))
-        bodies = pairs.TwoBodies(x, v, mass, radius, np.zeros((n, d)), grip, n - int(second.sum()))
+        ends = np.cumsum([d, d, (d + 3) * self.has_faces])
+        x, v, face, grip = map(np.ascontiguousarray, np.split(of_all[:, 3:], ends, axis=1))
+        first2 = n - int(second.sum())
+        bodies = pairs.TwoBodies(x, v, mass, radius, np.zeros((n, d)), grip, face, first2)
         cells = pairs.cells_for(n)
         pairs.push_apart(pairs.Push(self.law(), kin, self._reach, *times), bodies, cells)
         force = np.empty((n, d + grip.shape[1]))
@@ -189,14 +205,14 @@ class ContactMinimizePenetration(PairContact):
     Surfaces made of spheres are rough: the force to push a block (two points per cell and
     direction) is 0.19, 0.47, 0.57 and 0.52 of its weight with mu = 0, 0.3, 0.5 and 1. Faces
     inclined to the grid interlock: on a slope of 20 degrees with mu = 0, a block sticks, or with
-    points=cut accelerates at 2.8 instead of 3.4 m/s^2. Friction is correct in ulmpm/contacts.
+    points=cut accelerates at 2.8 instead of 3.4 m/s^2. Friction is correct with contact/solids.
 
     The cost is proportional to the number of points that may touch. With several processes, the
     first one searches for all contacts.
 
     See Also
     --------
-    contact/hertz, contact/friction, method tlmpm
+    contact/solids, contact/hertz, method tlmpm
     """
 
     impulsive = True
@@ -215,9 +231,8 @@ class ContactMinimizePenetration(PairContact):
                 f"friction {mu:g} does not act as given: surfaces of balls slow a sliding body "
                 "with about 0.2 of the normal force for a coefficient of 0, 0.5 for any above "
                 "0.3, and more if faces are inclined to the grid",
-                hint="method(ulmpm/contacts, ...) with fix contact/friction has smooth surfaces, "
-                "as has fix contact/surface if one of the two is rigid; leave mu out if nothing "
-                "slides",
+                hint="fix contact/solids has smooth surfaces, as has method(ulmpm/contacts, ...) "
+                "with fix contact/friction; leave mu out if nothing slides",
             )
 
     def law(self) -> MinimizePenetration:

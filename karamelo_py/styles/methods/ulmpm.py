@@ -63,8 +63,8 @@ class TLMPM(Method):
     """Total Lagrangian MPM: weights follow reference positions; each solid has its own grid.
 
     No point crosses a cell face, and a body breaks only by damage of its material. Solids do not
-    interact on the grid: define contact with fixes (contact/hertz, contact/minimize_penetration).
-    Use it for bodies that retain their topology (de Vaucorbeil, Nguyen & Hutchinson 2020, "A
+    interact on the grid: define contact with fixes (contact/solids, contact/surface). Use it for
+    bodies that retain their topology (de Vaucorbeil, Nguyen & Hutchinson 2020, "A
     Total-Lagrangian material point method for solid mechanics problems involving large
     deformations").
 
@@ -90,8 +90,8 @@ class TLMPM(Method):
         if len(hub.solids) > 1 and alone and not self.warned:
             self.warned = True
             hint = (
-                "fix(ID, contact/minimize_penetration, solid1, solid2, mu) for those that may "
-                "meet, or method ulmpm"
+                "fix(ID, contact/solids, solid1, solid2, mu) for those that may meet, or method "
+                "ulmpm"
             )
             if hub.update.scheme.traits.implicit:
                 hint = "method(ulmpm/contacts, ...) where they may meet"

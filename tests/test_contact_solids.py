@@ -1,0 +1,130 @@
+"""Fix contact/solids: faces of two solids push each other."""
+
+from math import cos, radians, sin
+
+import numpy as np
+import pytest
+from test_contact_points import bodies
+
+from comparisons import defaults
+
+SLOPE = (defaults.INPUTS / "in.slope_solids").read_text("utf-8")
+
+
+def slope(**values) -> str:
+    """The slope with the two components of the contact force on the block in its log."""
+    text = SLOPE.replace("time, along)", "time, along, rub_x, rub_y)").replace("time(T/50)", "1")
+    for name, value in values.items():
+        assert f"\n{name} = " in text
+        head, _, tail = text.partition(f"\n{name} = ")
+        text = f"{head}\n{name} = {value}\n{tail.partition(chr(10))[2]}"
+    return text
+
+
+@pytest.mark.parametrize("d", [1, 2, 3])
+def test_force_of_two_faces(run_interpreted, d):
+    """m/2 p / dt^2 for equal masses, also if the middle of a face is opposite two halves."""
+    lines = ("log_modify(custom, step, c_x, c_y)", "set_dt(0.001)", "run(1)")
+    script = bodies(-0.01, "contact/solids, a, b", *lines, d=d, n=3, ppc=1)
+    force = -0.5 * 0.1**d * 0.01 / 1e-6
+    assert run_interpreted(script).log.c_x[-1] == pytest.approx(force, rel=1e-8)
+    if d > 1:
+        shift = f"translate_particles(b, region, b, 0, 0.05{', 0' * (d - 2)})"
+        fix = "fix(c, contact/solids, a, b)"
+        shifted = script.replace("fix(v1", f"{fix}\n{shift}\nfix(v1", 1).replace(
+            f"\n{fix}\ncomp", "\ncomp"
+        )
+        log = run_interpreted(shifted).log
+        assert log.c_x[-1] == pytest.approx(force, rel=1e-8)
+        assert log.c_y[-1] == 0
+
+
+def forces(log, angle: float) -> tuple[np.ndarray, np.ndarray]:
+    """Forces of contact on the block, out of the slope and down along it."""
+    c, s = cos(radians(angle)), sin(radians(angle))
+    return log.rub_x * s + log.rub_y * c, log.rub_x * c - log.rub_y * s
+
+
+def test_faces_that_lean_to_the_grid_are_smooth(run_script):
+    """Without friction all of the force is across, also at the edges of the block.
+
+    If edges push along normals of their own, as much is along the slope as across it.
+    """
+    across, along = forces(run_script(slope(refine=2, mu=0, T=0.01)).log, 20)
+    assert across.max() > 1000
+    assert along == pytest.approx(0, abs=1e-3 * across.max())
+
+
+def test_friction_is_that_of_coulomb(run_script):
+    """Over two bounces of the block, after the first one, in which it begins to slide."""
+    log = run_script(slope(angle=27, mu=0.25, T=0.3)).log
+    across, along = (force[log.Time > 0.1] for force in forces(log, 27))
+    assert along.sum() == pytest.approx(-0.25 * across.sum(), rel=0.015)
+
+
+@pytest.mark.full
+@pytest.mark.parametrize(("mu", "rolls"), [(0.3, True), (0.05, False)])
+def test_disk_on_a_plane(run_script, mu, rolls):
+    """It rolls with 2/3 of g sin, or slides with g (sin - mu cos); 8 cells in its radius."""
+    angle = radians(20)
+    log = run_script(f"""
+        method(tlmpm, FLIP, linear, 1)
+        dimension(2, -1, 4, -0.4, 1.5, 0.0625)
+        region(disk, cylinder, 0, 0.5, 0.5)
+        region(floor, block, -1, 4, -0.3, 0)
+        material(m, neo-hookean, 1000, 1e6, 0.3)
+        material(rock, rigid, 1000)
+        solid(disk, region, disk, 2, m, 0.0625)
+        solid(base, region, floor, 2, rock, 0.0625)
+        fix(rub, contact/solids, disk, base, {mu})
+        group(disk, particles, region, disk, solid, disk)
+        slowly = min(1, time/0.1)
+        fix(g, body_force, all, {10 * sin(angle)}*slowly, {-10 * cos(angle)}*slowly)
+        compute(v, average_velocity, disk)
+        set_output(1)
+        log_modify(custom, step, time, v_x)
+        run_time(1)
+    """).log
+    late = log.Time > 0.3
+    exact = 10 * sin(angle) / 1.5 if rolls else 10 * (sin(angle) - mu * cos(angle))
+    found = np.polyfit(log.Time[late], log.v_x[late], 1)[0]
+    assert found == pytest.approx(exact, rel=0.02)
+
+
+def test_momentum_is_conserved(run_interpreted):
+    lines = ("log_modify(custom, step, va_x, vb_x, c_x)", "set_output(1)", "run(6)")
+    log = run_interpreted(bodies(-0.01, "contact/solids, a, b, 0.2", *lines, d=2, n=2)).log
+    assert np.abs(log.va_x + log.vb_x).max() < 1e-15
+    assert log.c_x[1] < 0
+
+
+MESSAGES = {
+    "method": (("ulmpm",), "needs a separate grid for each solid"),
+    "named twice": (("tlmpm", "a, a"), "'a' is named twice"),
+    "negative": (("tlmpm", "a, b, -0.1"), "-0.1"),
+}
+
+
+@pytest.mark.parametrize("given, said", MESSAGES.values(), ids=MESSAGES)
+def test_messages(run_interpreted, given, said):
+    method, names = (*given, "a, b")[:2]
+    script = bodies(0, f"contact/solids, {names}", "run(1)", method=method)
+    assert said in run_interpreted(script, status=1).err
+
+
+def test_solids_must_be_in_their_regions(run_interpreted, tmp_path):
+    moved = bodies(0.01, "contact/solids, a, b", "run(1)").replace(
+        "fix(c,", "region(all, block, INF, INF)\ntranslate_particles(b, region, b, 0.2)\nfix(c,"
+    )
+    assert "was moved out of its region" in run_interpreted(moved, status=1).err
+    (tmp_path / "run").mkdir(exist_ok=True)
+    (tmp_path / "run" / "one.csv").write_text("x,volume\n1.05,0.1\n")
+    given = bodies(0.01, "contact/solids, a, b", "run(1)").replace(
+        "solid(b, region, b, 2, m, 0.1, 0)", "solid(b, points, one.csv, m, 0.1)"
+    )
+    assert "does not fill a region" in run_interpreted(given, status=1).err
+
+
+def test_solids_must_be_two_points_thick(run_interpreted):
+    script = bodies(0.01, "contact/solids, a, b", "run(1)", n=1, ppc=1)
+    assert "is only one point thick" in run_interpreted(script, status=1).err
