@@ -1,5 +1,6 @@
 """Eos jwl: detonation products on closed forms, and a plane detonation."""
 
+import re
 from itertools import pairwise
 from math import exp
 
@@ -87,6 +88,7 @@ def test_the_slab_of_tnt(run_script):
     """
     script = (INPUTS / "in.tnt_slab").read_text("utf-8")
     done = run_script(script.replace("run_time(T)", "run_time(T/2)\nrun_time(T/2)"))
+    assert re.search("^  method +tlmpm TPIC quadratic-spline musl$", done.out, re.M)  # of auto
     files = sorted(done.folder.glob("tnt.*"), key=lambda path: int(path.name.split(".")[1]))
     fronts, peaks = [], []
     for file in files[-2:]:

@@ -233,6 +233,7 @@ def test_auto_leaves_what_the_script_names(run_interpreted):
     text = AUTO.format(d=1, domain="0, 1", box="0, 0.5", material=RUBBER, more="scheme(musl)")
     result = run_interpreted(text, command="check")
     assert re.search("^method +tlmpm PolyPIC linear musl$", result.out, re.M)
+    assert "usl" not in re.search("^chosen for +(.*)", result.out, re.M)[1]
     assert "warning" not in result.out + result.err
     for target in ("0", "-1", "1", "2", "small", '"0.1"'):
         with pytest.raises(ScriptError, match=r"accuracy|small"):
@@ -284,4 +285,5 @@ def test_auto_is_the_table_of_the_page():
     for choice, row in zip(CHOICES, rows, strict=False):
         lines = ", ".join(f"`{line.replace('{grid}', 'ulmpm')}`" for line in choice.lines)
         scenes = ", ".join(f"`{name}`" for name in choice.evidence)
-        assert row == [f"| {choice.scene}", lines, choice.why, f"{scenes} |"]
+        reason = choice.reason(choice.lines)
+        assert row == [f"| {choice.scene}", lines, reason, f"{scenes} |"]

@@ -5,7 +5,7 @@ facts replace names in braces in `lines`. `evidence` lists the scenes on which t
 Studies compare the chosen row with `ALTERNATIVES`.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Any, NamedTuple
 
 
@@ -15,6 +15,12 @@ class Choice(NamedTuple):
     scene: str
     why: str
     evidence: tuple[str, ...]
+    of_scheme: str = ""  # a reason that holds only with the scheme of `lines`
+
+    def reason(self, lines: Sequence[str]) -> str:
+        """Return the reason for `lines`, which lack the scheme if the script names another."""
+        with_scheme = any(line.startswith("scheme(") for line in lines)
+        return "; ".join(filter(None, (self.why, self.of_scheme * with_scheme)))
 
 
 CHOICES = (
@@ -71,15 +77,17 @@ CHOICES = (
         lambda s: s.gas and s.speed > 1 and s.d > 1 and s.diffuses,
         ("method(ulmpm, APIC, cubic-spline)", "scheme(usavg)"),
         "a gas that moves faster than its waves, with an artificial heat flux",
-        "densities behind the shock are the closest",
+        "",
         ("in.noh",),
+        "densities behind the shock are the closest",
     ),
     Choice(
         lambda s: s.gas and s.speed > 1 and s.d > 1,
         ("method(ulmpm, FLIP, quadratic-spline, 1)", "scheme(usavg)"),
         "a gas that moves faster than its waves",
-        "densities behind the shock are the closest without a heat flux",
+        "",
         ("in.noh",),
+        "densities behind the shock are the closest without a heat flux",
     ),
     Choice(
         lambda s: s.gas and len(s.soft) == 1 and s.speed < 0.1 and not s.burns,
@@ -176,9 +184,10 @@ CHOICES = (
         lambda s: s.alone,
         ("method(tlmpm, PolyPIC, linear)", "scheme(usl)"),
         "one elastic body",
-        "points stay in their cells, so a linear basis is second order, conserves energy and "
-        "angular momentum, and needs half as many passes over the points",
+        "points stay in their cells, so a linear basis is second order and conserves energy and "
+        "angular momentum",
         ("in.energy_disk", "in.turns", "in.axis_aligned"),
+        "usl needs half as many passes over the points as musl",
     ),
     Choice(
         lambda s: s.rolls,
@@ -212,8 +221,9 @@ CHOICES = (
         lambda s: s.grid == "ulmpm/contacts",
         ("method(ulmpm/contacts, FLIP, linear, 1)", "scheme(usavg)"),
         "elastic bodies that meet",
-        "rebounds lose the least energy, with the cheapest basis",
+        "the cheapest basis",
         ("in.rods", "in.punch"),
+        "rebounds lose the least energy",
     ),
     Choice(
         lambda s: True,

@@ -65,7 +65,7 @@ class Chosen(NamedTuple):
 
     @property
     def words(self) -> dict[str, str]:
-        reason = ": ".join(filter(None, (self.choice.scene, self.choice.why)))
+        reason = ": ".join(filter(None, (self.choice.scene, self.choice.reason(self.lines))))
         words = {"chosen for": reason, "which writes": "; ".join(self.lines)}
         if self.accuracy is not None:
             words["accuracy"] = f"{self.accuracy:g} is the target; not checked (karamelo-py advise)"

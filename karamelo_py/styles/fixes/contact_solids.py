@@ -141,7 +141,7 @@ def faces_of(solid: Solid, argument: str) -> np.ndarray:
 
 def tangents(normal: np.ndarray) -> list[np.ndarray]:
     """Return d - 1 unit vectors (n, d) across unit vectors (n, d)."""
-    n, d = normal.shape
+    d = normal.shape[1]
     if d < 3:
         return [normal[:, ::-1] * (1, -1)] * (d - 1)
     axis = np.eye(3)[abs(normal).argmin(axis=1)]
