@@ -48,7 +48,7 @@ def forces(log, angle: float) -> tuple[np.ndarray, np.ndarray]:
 def test_faces_that_lean_to_the_grid_are_smooth(run_script):
     """Without friction all of the force is across, also at the edges of the block.
 
-    If edges push along normals of their own, as much is along the slope as across it.
+    If edges push along separate normals, as much is along the slope as across it.
     """
     across, along = forces(run_script(slope(refine=2, mu=0, T=0.01)).log, 20)
     assert across.max() > 1000

@@ -135,8 +135,8 @@ def collect(matter, x, rows, out):
 
 
 @kernel
-def turn_faces(frame, matter, rows, faces):
-    """Turn and stretch `faces` (n, d + 3) of the reference shape with the points."""
+def rotate_faces(frame, matter, rows, faces):
+    """Rotate and stretch reference `faces` (n, d + 3) with the points."""
     kin, points, laws = at_hand(matter)
     none = zero_vector(kin, 0.0)
     for i in range(rows.size):

@@ -106,7 +106,7 @@ def _force_between_faces(law, kin, pair):
     common = min(0.5 * (face1.wide + face2.wide) - aside, narrow)
     touching = facing and 0 < p < narrow and common > 0
     # The widths of a body's faces add up to its surface, so the forces on a face do not depend on
-    # how its points are opposite those of the other body.
+    # how its points are opposite the points of the other body.
     reduced = mass1 * mass2 / (mass1 + mass2) * common / (narrow if narrow > 0 else 1.0)
     stiffness = reduced / (pair.dt * pair.kick) if touching else 0.0
     return -stiffness * p * normal, stiffness

@@ -95,7 +95,7 @@ class ContactSolids(PairContact):
     def faces(self, simulation: Any, block: Block, rows: np.ndarray) -> np.ndarray:
         faces = self._of(block, rows)
         matter = Matter(simulation.kin, block.points, block.laws)
-        pairs.turn_faces(simulation.setup.frame, matter, rows, faces)
+        pairs.rotate_faces(simulation.setup.frame, matter, rows, faces)
         return faces
 
 
