@@ -5,7 +5,7 @@ number of threads and of the order in memory.
 """
 
 from math import inf, sqrt
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -141,7 +141,7 @@ def rotate_faces(frame, matter, rows, faces):
     none = zero_vector(kin, 0.0)
     for i in range(rows.size):
         law, state = state_at(kin, points, laws, rows[i])
-        f = deformation_of(frame, kin, points, (law, state), rows[i])
+        f: Any = deformation_of(frame, kin, points, (law, state), rows[i])
         normal = inv(f.planar()).transposed() @ vector_at(kin, faces, i, 0, none)
         size = sqrt(normal.squared())
         for k in range(kin.dimension):
