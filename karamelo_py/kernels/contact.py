@@ -14,13 +14,13 @@ grid axes, as normals tilt where faces end. Any positive gap means that convex b
 
 In liquids and granular materials some points lie closer to a wall than their mean suggests, so each
 apparent gap would let them sink in. For 100 steps after a contact such bodies may leave a wall, but
-not approach it. Liquids are an exception: where the points do not fill the cells, they close 1 % of
-a gap per step, whatever the step size. (If water closed gaps in full cells, too, with APIC and a
-linear basis it would sink into thin walls by 48 % of a cell in 16 000 steps, not 16 %; with FLIP 1
-it sinks by up to 46 %. At higher rates it sinks half a cell into an inclined thin wall in 20 000
-steps; at lower rates a gap remains around a floating box. With such a rule for solids, a Hertzian
-disk has 4 % too little force.) Only faces towards the other body count, so walls may be one cell
-thick.
+not approach it. Liquids are an exception: where their points do not fill the cells, liquids close
+1 % of a gap per step, whatever the step size. (If gaps in full cells closed, too, water with APIC
+and a linear basis would sink into thin walls by 48 % of a cell in 16 000 steps, not 16 %; with FLIP
+1 water sinks by up to 46 %. At more than 1 %, water sinks half a cell into an inclined thin wall in
+20 000 steps; at less, a gap remains around a floating box. With such a rule for solids, the force
+on a Hertzian disk is 4 % too low.) Only faces towards the other body count, so walls may be one
+cell thick.
 """
 
 from math import sqrt

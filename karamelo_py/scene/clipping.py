@@ -18,8 +18,8 @@ EDGE = 0.05  # tolerance for the smallest sub-boxes
 SHEET = 0.01  # tolerance for a surface that may belong to a thin sheet
 LEAST = 0.1  # smallest fraction of a box; smaller pieces are merged with a neighbour
 NOTHING = 1e-9  # round-off / box size
-# Tolerated fraction of a box in smallest sub-boxes whose surface is not plane. The fraction is
-# ROUGH/3 at a corner in 2D or an edge in 3D, and larger in thin sheets.
+# Largest fraction of a box that may lie in smallest sub-boxes with a surface that is not plane:
+# ROUGH/3 at a corner in 2D or an edge in 3D, more in thin sheets.
 ROUGH = 0.025
 MOSTLY = 0.1
 FACE = 2  # pieces of a box face per direction

@@ -134,7 +134,7 @@ class Fix(Publisher):
     brakes = False
     water_only = False  # prescribes the pressure of pore water
     order = USUAL  # FIRST or LAST at each stage, regardless of the order in the script
-    # True: all work of Python hooks, if any, is summed. False: the energy balance is not monitored.
+    # True: Python hooks do no work, or all of it is summed. False: the energy is not monitored.
     conserves = False
     # Steps between calls of ``between_steps()`` (0: none), which returns True if it deleted points.
     every = 0

@@ -163,7 +163,7 @@ def plan_for(arguments: tuple) -> Plan:
     end = 0
 
     def lay(kind: Any) -> int:
-        """Return the offset of a held tuple, which follows its inner tuples."""
+        """Return the offset of a tuple in memory, after the tuples that it contains."""
         nonlocal end
         inner = [lay(item) if is_held(item) else None for item in kind]
         model = kind.register_type().pointee

@@ -435,7 +435,7 @@ def energy_to_unload(law, elastic, m):
     """Return the energy per elastic volume that is released with the pressure."""
     energy = energy_of_elastic_volume(law, elastic, m)
     if len(m.heat):
-        # Without pressure, a warm point is larger than at rest.
+        # Thermal expansion: a warm point without pressure is larger than its rest volume.
         warm = warm_pressure(law, elastic, m)
         K = eos.bulk_modulus(law.eos, elastic, m.energy, m.heat)
         energy += 0.5 * warm * warm * elastic / K
@@ -470,7 +470,7 @@ def sound(law, j, m):
 
 
 def sound_lost_to_damage(law, j, m):
-    """Return the squared wave speed lost to damage.
+    """Return the decrease of the squared wave speed due to damage.
 
     A broken point in tension has no waves, but its cracks may soon close, so the wave speed of
     rubble at its initial volume is a lower bound.

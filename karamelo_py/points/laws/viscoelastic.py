@@ -63,7 +63,7 @@ def is_isotropic(law: Any) -> bool:
     along = [strained(law, 4 * k)[k] for k in range(3)]
     shears = [strained(law, component)[k] for k, component in ((3, 1), (4, 2), (5, 5))]
     across = strained(law, 0)[1]
-    # 2 G from shear, and from the stresses along and across an axial strain.
+    # In isotropic bodies, stress along minus across an axial strain is 2 G, as in shear.
     even = [2 * shears[0] / (along[0] - across), 1.0]
     return max(map(np.ptp, (along, shears, max(along) * np.array(even)))) < 1e-3 * max(along)
 
@@ -305,7 +305,7 @@ def _advance_viscoelastic(law, kin, state, dl, dt):
     stiffness = stiffness_along(law.branches, added, dev(strain), state.stiffness)
     branches, loss = decayed(law.branches, state.branches, plain, added, dt)
     loss /= stiffness
-    # Work that relaxation prevents.
+    # The energy of the elastic law includes the work of the relaxed stress.
     lost = lost_stress(law, kin, before, state.branches).carried(plain)
     lost += lost_stress(law, kin, after, branches)
     gone = state.gone + loss + 0.5 * inner(lost, strain)

@@ -309,8 +309,8 @@ class ContactFriction(Fix):
 
     Friction acts on a liquid or gas at nodes within half a cell of the surface of a rigid solid.
 
-    Frictional work heats solids with a temperature: each gets half of it, or one gets all of it if
-    the other has no temperature. With ``thermo-mechanical``, it is divided in proportion to the
+    Frictional work heats solids with a temperature: each gets half of the work, or all of the work
+    if the other has no temperature. With ``thermo-mechanical``, it is divided in proportion to the
     effusivities sqrt(kappa rho cp), as between half-spaces.
 
     See Also

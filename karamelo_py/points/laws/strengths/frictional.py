@@ -63,8 +63,8 @@ def fraction_by_dilatancy(strength, memory):
     """Return the fraction b of F-bar's averaged pressure that the yield surface uses.
 
     Averaging multiplies volume waves by a factor a (1 for long waves, 0.1 to 0.5 for wave lengths
-    of two or three cells). Their stiffness in plastic flow is (a - f (1 - b + b a)) (a - d) times a
-    positive number, where f and d are the sines of friction and dilatancy. With b = 0 it is
+    of two or three cells). In plastic flow, their stiffness is (a - f (1 - b + b a)) (a - d) times
+    a positive number, where f and d are the sines of friction and dilatancy. With b = 0 it is
     negative for a between d and f, so that pressure grows in stripes and strength is lost. With b =
     (f - d)/(f (1 - d)) it is a square and never negative.
     """

@@ -89,7 +89,7 @@ def begin_behind(plane: Any, scene: Any) -> Any:
 
 
 class PlaneTool(ToolFix):
-    """Base of planes, which may move. Points belong on the side to which the normal points."""
+    """Base of tools with a plane. Points belong on the side to which the normal points."""
 
     def lay(self, origin: Sequence[Expression], normal: Sequence[Expression]) -> None:
         self.origin = self.of_time("", origin)

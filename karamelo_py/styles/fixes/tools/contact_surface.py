@@ -67,7 +67,7 @@ class ContactSurface(StiffTool):
     as in contact/minimize_penetration. Friction is a spring of the same stiffness against the slip,
     with at most mu times this force: it displaces a point at rest by at most mu p.
 
-    The spring conserves energy. Damping and friction dissipate it (``lost by contact`` in the
+    The spring conserves energy. Damping and friction dissipate energy (``lost by contact`` in the
     summary of the run), which the balance counts as work of the fix. A disk that hits a wall at 5
     to 25 % of its wave speed loses 0.6, 0.3 and 0.1 % of its energy with 4, 8 and 16 cells in the
     radius. A rod of 8 x 2 cells rebounds with 94 % of its speed, 98 % with dt_factor(0.9).

@@ -30,8 +30,8 @@ class NeumannBcMech(ToolFix):
     -----
     The force on a point is the traction times the area of one outer face, a side of a cube of the
     present volume V: V^(2/3) in 3D, V^(1/2) in 2D, the whole section in 1D; in axisymmetry at the
-    radius of the point. The force acts at the point, half a side inside the surface. Publishes the
-    total force as ID_x, ID_y, ID_z.
+    radius of the point. The force acts at the point, half a side of the cube below the surface.
+    Publishes the total force as ID_x, ID_y, ID_z.
 
     See Also
     --------
