@@ -177,8 +177,8 @@ def _lay_cells(d, bodies, cells, reach):
         lo1, hi1 = _range(bodies.x, 0, n, k)
         lo2, hi2 = _range(bodies.x, n, m, k)
         cells.corner[k] = max(lo1, lo2) - width
-        # also ends here for NaN
         length = min(hi1, hi2) + width - cells.corner[k]
+        # no overlap, or NaN
         if not 0 <= length < inf:
             return 0.0
         cells.length[k] = length

@@ -421,8 +421,7 @@ def _of_positions(measure: Callable) -> Callable[[Surface, np.ndarray, float], n
     return measure_all
 
 
-# Functions of positions (n, d) and a reach. They return, for each position, the depth (negative
-# outside), the distance to the nearest face, and the largest component of the vector to it; all are
-# at most `reach`.
+# Functions of positions (n, d) and `reach`, the upper bound of each result: depth (negative
+# outside), distance to the nearest face, largest component of the vector to the nearest face.
 depths, distances = _of_positions(_depth_in_surface), _of_positions(distance)
 offsets = _of_positions(_offset)

@@ -42,7 +42,7 @@ class RegionSolid(Solid):
         as volumes. ``cut``: equally spaced, with the boxes of points cut at the edge of the region.
         The default is ``cut`` for regions from files (mesh, stl), and in ulmpm/contacts for curved
         or inclined faces; otherwise ``regular``, but Gauss points with equal volumes for ``ppc`` 3,
-        as in Karamelo. With cpdi, and in other methods with ugimp and cpgimp, it is ``regular``.
+        as in Karamelo. With cpdi, ugimp and cpgimp, the default is ``regular``.
 
     Example
     -------

@@ -1,8 +1,8 @@
 """Kinetic energy that points lose in the transfer of velocity.
 
-A point of mass m that goes from v to v' has taken the change dv = sum_i N_i dv_i of the nodal
-velocities, which does the work m dv . (v + v') / 2 on it. The transfer takes the rest of the change
-of m v^2 / 2. If points store a velocity field v + a(X), dv_i also does work on the mean of a before
+When the velocity of a point of mass m changes from v to v', the change dv = sum_i N_i dv_i of nodal
+velocities does the work m dv . (v + v') / 2. The transfer takes the rest of the change of
+m v^2 / 2. If points store a velocity field v + a(X), dv_i also does work on the mean of a before
 and after the step, m sum_i N_i dv_i . (a_i + a'_i) / 2.
 
 Summed over points, the work is sum_i m_i dv_i . (v_i + w_i) / 2, with the nodal velocities v_i

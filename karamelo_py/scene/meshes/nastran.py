@@ -34,7 +34,7 @@ _TYPES = {
     **dict.fromkeys(("CQUAD4", "CQUADR", "CQUADX4", "CPLSTN4", "CPLSTS4"), ("quad", 4, 4)),
     **dict.fromkeys(("CQUAD8", "CQUADX8", "CPLSTN8", "CPLSTS8"), ("quad", 4, 8)),
 }  # fmt: skip
-# Order of nodes. In Nastran, vertical edges come after lower edges.
+# Nastran numbers nodes on vertical edges after those on lower edges.
 _ORDER = {
     "hexahedron20": [*range(12), *range(16, 20), *range(12, 16)],
     "wedge15": [*range(9), *range(12, 15), *range(9, 12)],
