@@ -10,6 +10,7 @@ import ctypes
 import functools
 import gc
 import io
+import itertools
 import json
 import math
 import os
@@ -21,6 +22,7 @@ from pathlib import Path
 from types import ModuleType
 
 MOST_PLACES = 1000  # whose stencils are kept
+MOST_OBJECTS = 20
 
 # Up to Python 3.11 a cached property is of one thread at a time: processes as threads meet in some.
 functools.RLock = contextlib.nullcontext
@@ -92,13 +94,14 @@ def trouble_emulator() -> None:
     Emulator.allocate, Emulator.launch = with_rubbish, shuffled
 
 
-def remembered(locate: Callable, entry: Callable) -> tuple[Callable, Callable]:
+def remember_stencils(product: ModuleType) -> None:
     """Keep the stencils of places, and their nodes: each visit of a step asks for the same.
 
     Numbers of nodes depend on the grid, which may be a box of it.
     """
+    locate, entry = product._locate_product, product._entry_product
     stencils: dict[tuple, tuple] = {}
-    nodes: dict[tuple, dict] = {}
+    nodes: dict[int, dict] = {}
 
     def located(basis, kin, grid, place):
         number = place[0].__class__
@@ -116,17 +119,34 @@ def remembered(locate: Callable, entry: Callable) -> tuple[Callable, Callable]:
             nodes[id(stencil)] = {}
         return found[0]
 
+    def weights_of(kin, stencil):
+        made = []
+        lines = [zip(one.weights, one.gradients, strict=True) for one in stencil.lines]
+        for pairs in itertools.product(*lines):
+            weights, slopes = zip(*pairs, strict=True)
+            weight = product.product(weights)
+            slopes = product.with_each_replaced(weights, slopes)
+            made.append((weight, product.with_hoop(kin, weight, slopes, stencil.inv_r)))
+        return made
+
     def found_entry(basis, kin, grid, stencil, k):
         known = nodes.get(id(stencil))
         if known is None:
             return entry(basis, kin, grid, stencil, k)
-        key = k, grid.first, grid.step_x, grid.step_y
+        key = grid.first, grid.step_x, grid.step_y
         found = known.get(key)
         if found is None:
-            found = known[key] = entry(basis, kin, grid, stencil, k)
-        return found
+            if not known:
+                known["weights"] = weights_of(kin, stencil)
+            first = product.node_number(grid, grid.first, [one.first for one in stencil.lines])
+            places = itertools.product(*[range(len(one.weights)) for one in stencil.lines])
+            found = known[key] = [
+                (first + product.node_number(grid, 0, at), *weights)
+                for at, weights in zip(places, known["weights"], strict=True)
+            ]
+        return found[k]
 
-    return located, found_entry
+    product._locate_product, product._entry_product = located, found_entry
 
 
 def quick_records() -> None:
@@ -221,19 +241,112 @@ def quick_slopes(slopes: ModuleType) -> None:
     slopes.combined = combined
 
 
+def remember(make: Callable) -> Callable:
+    """Keep what `make` returns for the same objects, of a few scenes."""
+    found: dict[tuple, tuple] = {}
+
+    def made(*things):
+        key = tuple(map(id, things))
+        known = found.get(key)
+        if known is None:
+            if len(found) > MOST_OBJECTS:
+                found.clear()
+            known = found[key] = make(*things), things  # alive, they alone have these identities
+        return known[0]
+
+    return made
+
+
+def quick_sums(sums: ModuleType, by_threads: Callable) -> None:
+    """Add boxes of tiles by ranges of nodes, not node by node."""
+    columns_of = remember(lambda quantities, kin: [*sums._columns(quantities, kin)])
+
+    def sum_shares(quantities, kin, nodes, buffers, share):
+        columns = columns_of(quantities, kin)
+        for row in range(buffers.first[share], buffers.first[share + 1]):
+            n, m, *counts, n_i, n_j, m_i, m_j, action = buffers.parts[row].tolist()
+            clears, keeps = action == sums.arrays.CLEAR, action == sums.arrays.ADD
+            for name, first, end, add in columns:
+                array, box = sums.node_array(nodes, name), sums.node_array(buffers.nodes, name)
+                if array is None or (add and clears):
+                    continue
+                for i, j in itertools.product(*map(range, counts[:2])):
+                    to, of = n + i * n_i + j * n_j, m + i * m_i + j * m_j
+                    into = array[to : to + counts[2], first:end]
+                    out_of = box[of : of + counts[2], first:end]
+                    if clears:
+                        into[:] = 0
+                    else:
+                        into[:] = (into if add or keeps else 0) + out_of
+                        out_of[:] = 0
+
+    sums.sum_shares = by_threads(sum_shares)
+
+
+def quick_scatter(eq: ModuleType) -> None:
+    """Look once for the arrays to which a quantity adds."""
+    register = eq._register
+
+    def register_both(kind):
+        register(kind)
+        by_array = itertools.groupby(kind.gives, lambda one: one.into.array)
+        groups = [(array, [*of_array]) for array, of_array in by_array]
+
+        @remember
+        def present(nodes, kin):
+            found = [(eq.node_array(nodes, array), of_array) for array, of_array in groups]
+            return [
+                (array, of_array[0].into.first(kin), [one.of for one in of_array])
+                for array, of_array in found
+                if array is not None
+            ]
+
+        @eq.scattered.on(kind)
+        def scatter(quantity, load, node):
+            for array, first, equations in present(node.w.nodes, node.w.kin):
+                values = eq.flat([of(load, node) for of in equations])
+                eq.accumulate(array, node.i, first, values)
+
+    eq._register = register_both
+
+
+def quick_states(views: ModuleType) -> None:
+    """Make the template of states once for a table of laws."""
+    from karamelo_py.compiler.tuples import nested_as
+
+    @remember
+    def template_of(laws, kin):
+        template = views.initial_state(views.record(laws, 0), kin, 1.0)
+        return template, range(views.count_in(template))
+
+    def state_at(kin, points, laws, p):
+        law, array = views.law_at(points, laws, p), points.state
+        template, rows = template_of(laws, kin)
+        return law, nested_as(template, tuple([array[k, p] for k in rows]))
+
+    views.state_at = state_at
+
+
 def quicken() -> None:
     """Import the program, and let it interpret scenes faster, with the same numbers."""
     from karamelo_py.compiler import slopes
+    from karamelo_py.compiler.threads import by_threads
     from karamelo_py.compiler.trace.functions import PointFunction
     from karamelo_py.kernels import totals
     from karamelo_py.points.basis import product
 
     quick_slopes(slopes)
     quick_totals(totals)  # before others import them
-    # Before the bases are there, which register them: a tenth of what steps take.
-    product._locate_product, product._entry_product = remembered(
-        product._locate_product, product._entry_product
-    )
+    remember_stencils(product)  # before the bases are there, which register them
+    from karamelo_py.kernels import views
+
+    quick_states(views)
+    from karamelo_py.kernels import equations
+
+    quick_scatter(equations)
+    from karamelo_py.kernels import sums
+
+    quick_sums(sums, by_threads)
     from karamelo_py.app import cli
     from karamelo_py.run import loop  # noqa: F401
 
