@@ -94,10 +94,11 @@ def trouble_emulator() -> None:
     Emulator.allocate, Emulator.launch = with_rubbish, shuffled
 
 
-def remember_stencils(product: ModuleType) -> None:
+def remember_stencils(product: ModuleType) -> Callable:
     """Keep the stencils of places, and their nodes: each visit of a step asks for the same.
 
-    Numbers of nodes depend on the grid, which may be a box of it.
+    Numbers of nodes depend on the grid, which may be a box of it. Returns ``kept(stencil, key,
+    make)``, which keeps further things of a stencil.
     """
     locate, entry = product._locate_product, product._entry_product
     stencils: dict[tuple, tuple] = {}
@@ -146,7 +147,16 @@ def remember_stencils(product: ModuleType) -> None:
             ]
         return found[k]
 
+    def kept(stencil, key, make):
+        known = nodes.get(id(stencil))
+        if known is None:
+            return None
+        if key not in known:
+            known[key] = make()
+        return known[key]
+
     product._locate_product, product._entry_product = located, found_entry
+    return kept
 
 
 def quick_records() -> None:
@@ -303,11 +313,73 @@ def quick_scatter(eq: ModuleType) -> None:
 
         @eq.scattered.on(kind)
         def scatter(quantity, load, node):
-            for array, first, equations in present(node.w.nodes, node.w.kin):
-                values = eq.flat([of(load, node) for of in equations])
+            found = [
+                (array, first, eq.flat([of(load, node) for of in equations]))
+                for array, first, equations in present(node.w.nodes, node.w.kin)
+            ]
+            for array, first, values in found:
                 eq.accumulate(array, node.i, first, values)
 
     eq._register = register_both
+
+
+def scatter_at_once(stencils: ModuleType, kept: Callable) -> None:
+    """Evaluate equations of nodes once for arrays of all nodes, where they do not branch."""
+    import numpy as np
+
+    from karamelo_py.kernels import views
+
+    one_by_one, eq = stencils._scatter, stencils.eq
+    branch: set[tuple] = set()
+
+    def stacked(vectors):
+        return vectors[0]._make([np.array(numbers) for numbers in zip(*vectors, strict=True)])
+
+    class Nodes(views.NodeView):
+        """All nodes of a stencil."""
+
+        __slots__ = ()
+
+        def _of_all(self, name):
+            w, stencil = self.w, self.stencil
+            every = range(len(self.i))
+            return kept(
+                stencil,
+                name,
+                lambda: stacked([getattr(views.node_of(w, stencil, k), name) for k in every]),
+            )
+
+        arm = property(lambda node: node._of_all("arm"))
+        affine_N = property(lambda node: node._of_all("affine_N"))
+
+    def all_of(w, stencil):
+        def made():
+            found = [views.node_of(w, stencil, k) for k in range(views.support(w.basis, w.kin))]
+            numbers = [node.i for node in found]
+            if len({*numbers}) < len(numbers):
+                return None
+            return (
+                np.array(numbers),
+                np.array([node.N for node in found]),
+                stacked([node.grad_N for node in found]),
+            )
+
+        parts = kept(stencil, (w.grid.first, w.grid.step_x, w.grid.step_y, "all"), made)
+        return parts and Nodes(w, stencil, None, *parts)
+
+    def scatter(quantities, w, stencil, loads):
+        nodes = all_of(w, stencil)
+        for quantity, load in zip(quantities, loads, strict=True):
+            key = type(quantity), type(w.transfer), type(w.basis)
+            if nodes is not None and key not in branch:
+                try:
+                    eq.scattered(quantity, load, nodes)
+                    continue
+                except (TypeError, ValueError):
+                    branch.add(key)
+            one_by_one((quantity,), w, stencil, (load,))
+
+    stencils._scatter = scatter
 
 
 def quick_states(views: ModuleType) -> None:
@@ -337,7 +409,7 @@ def quicken() -> None:
 
     quick_slopes(slopes)
     quick_totals(totals)  # before others import them
-    remember_stencils(product)  # before the bases are there, which register them
+    kept = remember_stencils(product)  # before the bases are there, which register them
     from karamelo_py.kernels import views
 
     quick_states(views)
@@ -347,6 +419,9 @@ def quicken() -> None:
     from karamelo_py.kernels import sums
 
     quick_sums(sums, by_threads)
+    from karamelo_py.kernels import stencils
+
+    scatter_at_once(stencils, kept)
     from karamelo_py.app import cli
     from karamelo_py.run import loop  # noqa: F401
 
