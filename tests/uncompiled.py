@@ -17,12 +17,14 @@ import os
 import sys
 import traceback
 import warnings
-from collections.abc import Callable
+from collections import Counter
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from types import ModuleType
 
 MOST_PLACES = 1000  # whose stencils are kept
 MOST_OBJECTS = 20
+TRIALS = 5  # of sums over arrays of nodes
 
 # Up to Python 3.11 a cached property is of one thread at a time: processes as threads meet in some.
 functools.RLock = contextlib.nullcontext
@@ -323,14 +325,25 @@ def quick_scatter(eq: ModuleType) -> None:
     eq._register = register_both
 
 
-def scatter_at_once(stencils: ModuleType, kept: Callable) -> None:
-    """Evaluate equations of nodes once for arrays of all nodes, where they do not branch."""
+def rebuilt(template: tuple, numbers: Iterator) -> tuple:
+    """Nest numbers as in a template."""
+    parts = [rebuilt(one, numbers) if isinstance(one, tuple) else next(numbers) for one in template]
+    return template._make(parts) if hasattr(template, "_make") else tuple(parts)
+
+
+def visit_nodes_at_once(stencils: ModuleType, kept: Callable) -> None:
+    """Evaluate equations of nodes once for arrays of all nodes, where they do not branch.
+
+    Sums over nodes are made from the first to the last, as one by one. That a task only adds to its
+    total is tried with the first points.
+    """
     import numpy as np
 
     from karamelo_py.kernels import views
 
-    one_by_one, eq = stencils._scatter, stencils.eq
+    scatter_each, gather_each, eq = stencils._scatter, stencils._gather, stencils.eq
     branch: set[tuple] = set()
+    trials: Counter = Counter()
 
     def stacked(vectors):
         return vectors[0]._make([np.array(numbers) for numbers in zip(*vectors, strict=True)])
@@ -377,9 +390,36 @@ def scatter_at_once(stencils: ModuleType, kept: Callable) -> None:
                     continue
                 except (TypeError, ValueError):
                     branch.add(key)
-            one_by_one((quantity,), w, stencil, (load,))
+            scatter_each((quantity,), w, stencil, (load,))
 
-    stencils._scatter = scatter
+    def total_of(task, nodes, total):
+        try:
+            made = eq.flat(eq.gathered(task, nodes, total))
+            sums = np.add.accumulate(np.array(made), axis=1)[:, -1]
+        except (TypeError, ValueError):
+            return None
+        return rebuilt(total, iter(sums)) if len(made) == len(eq.flat(total)) else None
+
+    def gather(tasks, w, stencil, totals):
+        nodes, found = all_of(w, stencil), []
+        for task, total in zip(tasks, totals, strict=True):
+            key = type(task), type(w.transfer), type(w.basis), type(w.kin), type(w.averaging)
+            made = None
+            if nodes is not None and key not in branch and not any(eq.flat(total)):
+                made = total_of(task, nodes, total)
+                if made is None:
+                    branch.add(key)
+            if made is None or trials[key] < TRIALS:
+                (each,) = gather_each((task,), w, stencil, (total,))
+                if made is not None:
+                    trials[key] += 1
+                    if repr(made) != repr(each):
+                        branch.add(key)
+                made = each
+            found.append(made)
+        return tuple(found)
+
+    stencils._scatter, stencils._gather = scatter, gather
 
 
 def quick_states(views: ModuleType) -> None:
@@ -421,7 +461,7 @@ def quicken() -> None:
     quick_sums(sums, by_threads)
     from karamelo_py.kernels import stencils
 
-    scatter_at_once(stencils, kept)
+    visit_nodes_at_once(stencils, kept)
     from karamelo_py.app import cli
     from karamelo_py.run import loop  # noqa: F401
 
