@@ -96,15 +96,17 @@ def trouble_emulator() -> None:
     Emulator.allocate, Emulator.launch = with_rubbish, shuffled
 
 
-def remember_stencils(product: ModuleType) -> Callable:
+def remember_stencils(product: ModuleType) -> tuple[Callable, Callable]:
     """Keep the stencils of places, and their nodes: each visit of a step asks for the same.
 
-    Numbers of nodes depend on the grid, which may be a box of it. Returns ``kept(stencil, key,
-    make)``, which keeps further things of a stencil.
+    Returns ``kept(stencil, key, make)``, which keeps further things of a stencil, and
+    ``arrays(kin, grid, stencil)``, numbers, weights and gradients of all nodes, or None.
     """
+    import numpy as np
+
     locate, entry = product._locate_product, product._entry_product
     stencils: dict[tuple, tuple] = {}
-    nodes: dict[int, dict] = {}
+    things: dict[int, dict] = {}
 
     def located(basis, kin, grid, place):
         number = place[0].__class__
@@ -115,50 +117,61 @@ def remember_stencils(product: ModuleType) -> Callable:
         if found is None:
             if len(stencils) > MOST_PLACES:
                 stencils.clear()
-                nodes.clear()
+                things.clear()
             stencil = locate(basis, kin, grid, place)
             # With these two and the stencil alive, nothing else has their identities.
             found = stencils[key] = stencil, basis, kin
-            nodes[id(stencil)] = {}
+            things[id(stencil)] = {}
         return found[0]
 
-    def weights_of(kin, stencil):
-        made = []
-        lines = [zip(one.weights, one.gradients, strict=True) for one in stencil.lines]
-        for pairs in itertools.product(*lines):
-            weights, slopes = zip(*pairs, strict=True)
-            weight = product.product(weights)
-            slopes = product.with_each_replaced(weights, slopes)
-            made.append((weight, product.with_hoop(kin, weight, slopes, stencil.inv_r)))
-        return made
-
-    def found_entry(basis, kin, grid, stencil, k):
-        known = nodes.get(id(stencil))
-        if known is None:
-            return entry(basis, kin, grid, stencil, k)
-        key = grid.first, grid.step_x, grid.step_y
-        found = known.get(key)
-        if found is None:
-            if not known:
-                known["weights"] = weights_of(kin, stencil)
-            first = product.node_number(grid, grid.first, [one.first for one in stencil.lines])
-            places = itertools.product(*[range(len(one.weights)) for one in stencil.lines])
-            found = known[key] = [
-                (first + product.node_number(grid, 0, at), *weights)
-                for at, weights in zip(places, known["weights"], strict=True)
-            ]
-        return found[k]
-
     def kept(stencil, key, make):
-        known = nodes.get(id(stencil))
+        known = things.get(id(stencil))
         if known is None:
             return None
         if key not in known:
             known[key] = make()
         return known[key]
 
+    def along(values):
+        """Values along each axis, as arrays that NumPy combines to those of all nodes."""
+        return np.ix_(*values) if len(values) > 1 else [np.array(*values)]
+
+    def weights_of(kin, stencil):
+        lines = stencil.lines
+        if len({type(x) for line in lines for x in (*line.weights, *line.gradients)}) > 1:
+            return None
+        weights = along([line.weights for line in lines])
+        weight = product.product(weights)
+        slopes = product.with_each_replaced(weights, along([line.gradients for line in lines]))
+        gradient = product.with_hoop(kin, weight, slopes, stencil.inv_r)
+        return weight.ravel(), gradient._make([slope.ravel() for slope in gradient])
+
+    def arrays(kin, grid, stencil):
+        weights = kept(stencil, "weights", lambda: weights_of(kin, stencil))
+
+        def made():  # of a grid, which may be a box of it
+            first = product.node_number(grid, grid.first, [line.first for line in stencil.lines])
+            steps = along([range(len(line.weights)) for line in stencil.lines])
+            numbers = (first + product.node_number(grid, 0, steps)).ravel()
+            return (numbers, *weights) if len({*numbers.tolist()}) == len(numbers) else None
+
+        return weights and kept(stencil, (grid.first, grid.step_x, grid.step_y), made)
+
+    def one_by_one(kin, grid, stencil):
+        found = arrays(kin, grid, stencil)
+        if found is None:
+            return None
+        numbers, weights, gradient = found
+        gradients = map(gradient._make, zip(*gradient, strict=True))
+        return [*zip(numbers.tolist(), weights, gradients, strict=True)]
+
+    def found_entry(basis, kin, grid, stencil, k):
+        key = grid.first, grid.step_x, grid.step_y, "one by one"
+        found = kept(stencil, key, lambda: one_by_one(kin, grid, stencil))
+        return entry(basis, kin, grid, stencil, k) if found is None else found[k]
+
     product._locate_product, product._entry_product = located, found_entry
-    return kept
+    return kept, arrays
 
 
 def quick_records() -> None:
@@ -331,7 +344,7 @@ def rebuilt(template: tuple, numbers: Iterator) -> tuple:
     return template._make(parts) if hasattr(template, "_make") else tuple(parts)
 
 
-def visit_nodes_at_once(stencils: ModuleType, kept: Callable) -> None:
+def visit_nodes_at_once(stencils: ModuleType, kept: Callable, arrays: Callable) -> None:
     """Evaluate equations of nodes once for arrays of all nodes, where they do not branch.
 
     Sums over nodes are made from the first to the last, as one by one. That a task only adds to its
@@ -366,18 +379,7 @@ def visit_nodes_at_once(stencils: ModuleType, kept: Callable) -> None:
         affine_N = property(lambda node: node._of_all("affine_N"))
 
     def all_of(w, stencil):
-        def made():
-            found = [views.node_of(w, stencil, k) for k in range(views.support(w.basis, w.kin))]
-            numbers = [node.i for node in found]
-            if len({*numbers}) < len(numbers):
-                return None
-            return (
-                np.array(numbers),
-                np.array([node.N for node in found]),
-                stacked([node.grad_N for node in found]),
-            )
-
-        parts = kept(stencil, (w.grid.first, w.grid.step_x, w.grid.step_y, "all"), made)
+        parts = arrays(w.kin, w.grid, stencil)
         return parts and Nodes(w, stencil, None, *parts)
 
     def scatter(quantities, w, stencil, loads):
@@ -449,7 +451,7 @@ def quicken() -> None:
 
     quick_slopes(slopes)
     quick_totals(totals)  # before others import them
-    kept = remember_stencils(product)  # before the bases are there, which register them
+    kept, arrays = remember_stencils(product)  # before the bases are there, which register them
     from karamelo_py.kernels import views
 
     quick_states(views)
@@ -461,7 +463,7 @@ def quicken() -> None:
     quick_sums(sums, by_threads)
     from karamelo_py.kernels import stencils
 
-    visit_nodes_at_once(stencils, kept)
+    visit_nodes_at_once(stencils, kept, arrays)
     from karamelo_py.app import cli
     from karamelo_py.run import loop  # noqa: F401
 
