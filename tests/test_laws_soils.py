@@ -126,17 +126,16 @@ def triaxial(law, radial, steps=400, rate=-2e-4):
         new = stretched(law, kin, state, np.diag([r, rate, r]), 1)
         return new, stress(law, kin, new)[0, 0] + radial
 
+    b = -rate / 2
     for _ in range(steps):
-        a, b = 0.0, -rate / 2
-        fa, fb = tried(a)[1], tried(b)[1]
+        a = 0.9 * b
+        fa, (new, fb) = tried(a)[1], tried(b)
         for _ in range(60):
-            if fb == fa:
+            if abs(fb) < 1e-13 or fb == fa:
                 break
             a, fa, b = b, fb, b - fb * (b - a) / (fb - fa)
-            fb = tried(b)[1]
-            if abs(fb) < 1e-13:
-                break
-        state = tried(b)[0]
+            new, fb = tried(b)
+        state = new
     return stress(law, kin, state)[1, 1], state
 
 

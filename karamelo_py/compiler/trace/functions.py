@@ -244,8 +244,9 @@ class PointFunction:
         return nearest[classes]
 
     def _plain(self, *arguments: Any) -> Any:
-        classes = tuple([a.__class__ for a in arguments[: self.tags]])
-        nearest = self._nearest
+        nearest, classes = self._nearest, (arguments[0].__class__,)
+        if self.tags > 1:
+            classes = tuple([a.__class__ for a in arguments[: self.tags]])
         chosen = nearest[classes] if classes in nearest else self.find(classes)
         if chosen is None:
             raise Undefined(self.__name__, classes)

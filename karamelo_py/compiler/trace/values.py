@@ -50,6 +50,7 @@ def _only_at_run_time(use: str) -> Callable:
 
 # Active lowerings of each Python thread, innermost last.
 _lowerings: contextvars.ContextVar[tuple] = contextvars.ContextVar("lowerings", default=())
+at_work = _lowerings.get  # every call of a point function asks
 
 
 def now() -> Any:
@@ -64,10 +65,6 @@ def writing(lowering: Any) -> Iterator[None]:
         yield
     finally:
         _lowerings.reset(before)
-
-
-def at_work() -> bool:
-    return bool(_lowerings.get())
 
 
 def is_begun(key: tuple) -> bool:
