@@ -308,9 +308,12 @@ def quick_sums(sums: ModuleType, by_threads: Callable) -> None:
     sums.sum_shares = by_threads(sum_shares)
 
 
-def quick_scatter(eq: ModuleType) -> None:
-    """Look once for the arrays to which a quantity adds."""
-    register = eq._register
+def quick_scatter(eq: ModuleType) -> dict[type, Callable]:
+    """Look once for the arrays to which a quantity adds.
+
+    Returns ``given(load, node)`` by quantity: arrays, their first columns, and what is added.
+    """
+    register, all_given = eq._register, {}
 
     def register_both(kind):
         register(kind)
@@ -326,16 +329,21 @@ def quick_scatter(eq: ModuleType) -> None:
                 if array is not None
             ]
 
-        @eq.scattered.on(kind)
-        def scatter(quantity, load, node):
-            found = [
+        def given(load, node):
+            return [
                 (array, first, eq.flat([of(load, node) for of in equations]))
                 for array, first, equations in present(node.w.nodes, node.w.kin)
             ]
-            for array, first, values in found:
+
+        @eq.scattered.on(kind)
+        def scatter(quantity, load, node):
+            for array, first, values in given(load, node):
                 eq.accumulate(array, node.i, first, values)
 
+        all_given[kind] = given
+
     eq._register = register_both
+    return all_given
 
 
 def rebuilt(template: tuple, numbers: Iterator) -> tuple:
@@ -344,11 +352,13 @@ def rebuilt(template: tuple, numbers: Iterator) -> tuple:
     return template._make(parts) if hasattr(template, "_make") else tuple(parts)
 
 
-def visit_nodes_at_once(stencils: ModuleType, kept: Callable, arrays: Callable) -> None:
+def visit_nodes_at_once(
+    stencils: ModuleType, kept: Callable, arrays: Callable, given: dict[type, Callable]
+) -> None:
     """Evaluate equations of nodes once for arrays of all nodes, where they do not branch.
 
-    Sums over nodes are made from the first to the last, as one by one. That a task only adds to its
-    total is tried with the first points.
+    Sums over nodes are made from the first to the last, as one by one. The first points of each
+    kind are tried both ways.
     """
     import numpy as np
 
@@ -380,43 +390,65 @@ def visit_nodes_at_once(stencils: ModuleType, kept: Callable, arrays: Callable) 
 
     def all_of(w, stencil):
         parts = arrays(w.kin, w.grid, stencil)
-        return parts and Nodes(w, stencil, None, *parts)
+        return parts and Nodes(w, stencil, np.arange(len(parts[0])), *parts)
+
+    def kind_of(tag, w):
+        parts = tag, w.frame, w.kin, w.basis, w.transfer, w.averaging, w.laws
+        return tuple(type(part) for part in parts)
+
+    def agrees(kind, made, each):
+        """Whether both ways agree, for the first points with numbers other than 0."""
+        trials[kind] += any(number != 0 for number in made)
+        if [repr(number) for number in made] != [repr(number) for number in each]:
+            branch.add(kind)
+        return kind not in branch
+
+    def values(quantity, load, nodes, kind):
+        found = given[type(quantity)](load, nodes)
+        if trials[kind] < TRIALS:
+            every = [views.node_of(nodes.w, nodes.stencil, k) for k in nodes.k]
+            each = [given[type(quantity)](load, node) for node in every]
+            each = [number for one in each for _, _, numbers in one for number in numbers]
+            made = [np.broadcast_to(x, len(every)) for _, _, numbers in found for x in numbers]
+            if not agrees(kind, [*np.array(made).T.ravel()], each):
+                return None
+        return found
 
     def scatter(quantities, w, stencil, loads):
         nodes = all_of(w, stencil)
         for quantity, load in zip(quantities, loads, strict=True):
-            key = type(quantity), type(w.transfer), type(w.basis)
-            if nodes is not None and key not in branch:
+            kind, found = kind_of(quantity, w), None
+            if nodes is not None and kind not in branch:
                 try:
-                    eq.scattered(quantity, load, nodes)
-                    continue
+                    found = values(quantity, load, nodes, kind)
                 except (TypeError, ValueError):
-                    branch.add(key)
-            scatter_each((quantity,), w, stencil, (load,))
+                    branch.add(kind)
+            if found is None:
+                scatter_each((quantity,), w, stencil, (load,))
+            else:
+                for array, first, numbers in found:
+                    eq.accumulate(array, nodes.i, first, numbers)
 
     def total_of(task, nodes, total):
         try:
-            made = eq.flat(eq.gathered(task, nodes, total))
+            made = eq.flat((eq.gathered(task, nodes, total),))
             sums = np.add.accumulate(np.array(made), axis=1)[:, -1]
         except (TypeError, ValueError):
             return None
-        return rebuilt(total, iter(sums)) if len(made) == len(eq.flat(total)) else None
+        return rebuilt((total,), iter(sums))[0] if len(made) == len(eq.flat((total,))) else None
 
     def gather(tasks, w, stencil, totals):
         nodes, found = all_of(w, stencil), []
         for task, total in zip(tasks, totals, strict=True):
-            key = type(task), type(w.transfer), type(w.basis), type(w.kin), type(w.averaging)
-            made = None
-            if nodes is not None and key not in branch and not any(eq.flat(total)):
+            kind, made = kind_of(task, w), None
+            if nodes is not None and kind not in branch and not any(eq.flat((total,))):
                 made = total_of(task, nodes, total)
                 if made is None:
-                    branch.add(key)
-            if made is None or trials[key] < TRIALS:
+                    branch.add(kind)
+            if made is None or trials[kind] < TRIALS:
                 (each,) = gather_each((task,), w, stencil, (total,))
                 if made is not None:
-                    trials[key] += 1
-                    if repr(made) != repr(each):
-                        branch.add(key)
+                    agrees(kind, eq.flat((made,)), eq.flat((each,)))
                 made = each
             found.append(made)
         return tuple(found)
@@ -457,13 +489,13 @@ def quicken() -> None:
     quick_states(views)
     from karamelo_py.kernels import equations
 
-    quick_scatter(equations)
+    given = quick_scatter(equations)
     from karamelo_py.kernels import sums
 
     quick_sums(sums, by_threads)
     from karamelo_py.kernels import stencils
 
-    visit_nodes_at_once(stencils, kept, arrays)
+    visit_nodes_at_once(stencils, kept, arrays, given)
     from karamelo_py.app import cli
     from karamelo_py.run import loop  # noqa: F401
 
