@@ -109,14 +109,15 @@ def _write(hub: Hub, path: Path, within: bool, point: RollbackPoint | None, grou
         root.attrs["program"] = __version__
         root.attrs["step"], root.attrs["time"] = hub.update.step, hub.update.time
         text = json.dumps(content, default=lambda late: late.plain()).encode()
-        _put(root, wholes({"content": np.frombuffer(text, np.uint8)}))
+        arrays = _put(root, wholes({"content": np.frombuffer(text, np.uint8)}))
         for name, one in states.items():
             if one.arrays:
-                _put(root.create_group(name), wholes({str(k): a for k, a in enumerate(one.arrays)}))
+                members = wholes({str(k): a for k, a in enumerate(one.arrays)})
+                arrays += _put(root.create_group(name), members)
         for name, members in groups.items():
-            _put(root.create_group(name), members)
+            arrays += _put(root.create_group(name), members)
         root.flush()
-        for data in _arrays_in(root):
+        for data in arrays:
             data.attrs[CHECKSUM] = _checksum(data, out)
 
 
@@ -157,16 +158,17 @@ def _checksum(data: "h5py.Dataset", file: BinaryIO) -> int:
     return crc
 
 
-def _put(group: "h5py.Group", pieces: Iterator[Stored]) -> None:
-    begun: dict[str, h5py.Dataset] = {}
+def _put(group: "h5py.Group", pieces: Iterator[Stored]) -> "list[h5py.Dataset]":
+    made: dict[str, h5py.Dataset] = {}
     for name, shape, where, array in pieces:
-        if array.shape == shape and array.size and name not in begun:
-            group.create_dataset(name, data=array, track_times=False)  # twice as fast
+        if array.shape == shape and array.size and name not in made:  # twice as fast
+            made[name] = group.create_dataset(name, data=array, track_times=False)
             continue
-        if name not in begun:
-            begun[name] = group.create_dataset(name, shape, array.dtype, track_times=False)
+        if name not in made:
+            made[name] = group.create_dataset(name, shape, array.dtype, track_times=False)
         if array.size:
-            begun[name][where] = array
+            made[name][where] = array
+    return [*made.values()]
 
 
 def is_restart(path: Path) -> bool:
