@@ -161,7 +161,7 @@ def test_a_wheel_in_sand(run_script, slip, pull, torque):
     """Ding et al. 2011, smooth wheel. Friction that creeps gives 2 N at a slip of 0.1."""
     words = ("-var", "slip", f"{slip}", "-var", "T", "0.9")
     result = run_script(INPUTS / "in.wheel", *words)
-    assert late(result.log, "torque", 0.6) == pytest.approx(torque, rel=0.25)
+    assert late(result.log, "torque", 0.6) == pytest.approx(torque, rel=0.15)
     assert late(result.log, "pull", 0.6) == pytest.approx(pull, rel=0.25)
     if slip == 0.6:
         assert late(result.log, "sinkage", 0.9) == pytest.approx(17.5e-3, rel=0.3)
