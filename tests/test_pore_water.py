@@ -38,6 +38,7 @@ BODY = """
     run(10)
 """
 SCHEMES = "musl", "semi-implicit"
+SMOOTH = "ulmpm", "quadratic-spline"
 same_kernels = pytest.mark.xdist_group("pore water")
 
 
@@ -73,9 +74,13 @@ def test_consolidation_is_that_of_terzaghi(run_script, k, Tv):
 
 
 @same_kernels
-@pytest.mark.parametrize("scheme", SCHEMES)
-def test_a_restarted_column_has_the_same_bits(run_script, scheme):
+@pytest.mark.parametrize(
+    ("scheme", "kind", "form"),
+    [*((scheme, "tlmpm", "linear") for scheme in SCHEMES), ("semi-implicit", *SMOOTH)],
+)
+def test_a_restarted_column_has_the_same_bits(run_script, scheme, kind, form):
     text = (INPUTS / "in.terzaghi").read_text("utf-8")
+    text = text.replace('"tlmpm"', f'"{kind}"').replace('"linear"', f'"{form}"')
     text = text.replace("dimension(", f"scheme({scheme})\ndimension(")
     text = text.replace("bottom, 0)", "bottom, 1e-4*sin(100*time))")
     text = text.replace("run_time(Tv*H^2/cv)", "run(300)\nwrite_restart(half.h5)\nrun(200)\nDUMP")
@@ -229,21 +234,22 @@ WAYS = {
     "tlmpm, PIC, linear": "3, -1, 1, -1, 1, -1, 1, 0.25",
     "tlmpm, FLIP, linear, 1": "2, -1, 1, -1, 1, 0.25",
     "tlmpm, FLIP, linear, 0.9": "3, -1, 1, -1, 1, -1, 1, 0.25",
+    "tlmpm, FLIP, quadratic-spline, 1": "2, -1, 1, -1, 1, 0.25",
+    "ulmpm, FLIP, quadratic-spline, 1": "2, -1, 1, -1, 1, 0.25",
+    "ulmpm, FLIP, cubic-spline, 0.9": "2, -1, 1, -1, 1, 0.25",
 }
+SOLVED = {way for way in WAYS if way.startswith("tlmpm, FLIP")} | {*[*WAYS][-2:]}
 
 
 @pytest.mark.parametrize("way", WAYS)
 @pytest.mark.parametrize("boxes", [False, True])
 def test_water_and_momentum_are_conserved(state_interpreted, way, boxes):
-    """Of a free body with random velocities; water in ulmpm with splines to 1e-6.
-
-    FLIP in tlmpm takes semi-implicit steps.
-    """
+    """Of a free body with random velocities; in explicit steps of ulmpm with splines to 1e-6."""
     domain = WAYS[way]
     v = "0.3*sin(13*x0 + 7*y0), 0.3*cos(11*x0 - 5*y0)" + ", 0.1" * (domain[0] == "3")
     body = ", ".join(["-0.25, 0.25"] * int(domain[0]))
     script = BODY.format(way=way, domain=domain, body=body, v=v)
-    if way.startswith("tlmpm, FLIP"):
+    if way in SOLVED:
         script = script.replace("dimension", "scheme(semi-implicit)\ndimension")
         script = script.replace("run(10)", "run(4)") if domain[0] == "3" else script
     names = "vx", "vy", "wx", "wy", "water_content", "pore_pressure"
@@ -260,7 +266,7 @@ def test_water_and_momentum_are_conserved(state_interpreted, way, boxes):
 
     (water, momentum, scale), (left, moved, _) = sums(before), sums(after)
     assert np.ptp(after["pore_pressure"]) > 1e3
-    assert abs(left / water - 1) < (1e-6 if "spline" in way else 1e-14)
+    assert abs(left / water - 1) < (1e-6 if "spline" in way and way not in SOLVED else 1e-14)
     assert np.abs(moved - momentum).max() < 1e-13 * scale.sum()
 
 
@@ -402,11 +408,26 @@ def test_the_semi_implicit_step_is_stable(run_interpreted, K, courant):
 
 @same_kernels
 @pytest.mark.parametrize(
-    "k", ["1e-3", *(pytest.param(k, marks=pytest.mark.full) for k in ("1e-4", "1e-5"))]
+    ("k", "kind", "form"),
+    [
+        ("1e-3", "tlmpm", "linear"),
+        ("1e-3", *SMOOTH),
+        *(
+            pytest.param(k, kind, form, marks=pytest.mark.full)
+            for k, kind, form in (
+                ("1e-4", "tlmpm", "linear"),
+                ("1e-5", "tlmpm", "linear"),
+                ("1e-4", *SMOOTH),
+                ("1e-3", "tlmpm", "quadratic-spline"),
+                ("1e-3", "ulmpm", "cubic-spline"),
+            )
+        ),
+    ],
 )
-def test_the_step_of_the_dry_soil_consolidates_as_terzaghi_has_it(run_script, k):
+def test_the_step_of_the_dry_soil_consolidates_as_terzaghi_has_it(run_script, k, kind, form):
     """Semi-implicit steps are 21 times longer than explicit ones, each at its own step."""
     text = (INPUTS / "in.terzaghi").read_text("utf-8").replace("dt_factor(0.5)", "")
+    text = text.replace('"tlmpm"', f'"{kind}"').replace('"linear"', f'"{form}"')
     text = text.replace("dimension(", "scheme(semi-implicit)\ndimension(")
     text = text.replace("set_output(1000)", f"set_output({round(0.01 / float(k))})")
     log = run_script(text, "-var", "k", k, "-var", "Tv", "1", "-var", "scale", "1").log
@@ -415,7 +436,7 @@ def test_the_step_of_the_dry_soil_consolidates_as_terzaghi_has_it(run_script, k)
         at = np.argmin(abs(log["T"] - T))
         U, p = terzaghi(log["T"][at], 1 - 1 / 64)
         assert abs(log["U"][at] - U) < 0.0025
-        assert abs(log["p0"][at] - p) < 0.001
+        assert abs(log["p0"][at] - p) < 0.0015
     assert abs(log["base_x"][-1] - 1000) < 0.1
 
 
@@ -486,8 +507,7 @@ def test_what_has_no_pore_water_is_refused_by_name(run_interpreted, head):
 
 
 NOT_SOLVED = {
-    "method(ulmpm, FLIP, linear, 1)": ("", "method ulmpm"),
-    "method(tlmpm, FLIP, quadratic-spline, 1)": ("", "the basis quadratic-spline"),
+    "method(ulmpm, FLIP, linear, 1)": ("fix(c, local_damping, all)", "fix local_damping"),
     "method(tlmpm, FLIP, linear, 1)": ("fix(c, local_damping, all)", "fix local_damping"),
     "method(tlmpm, PIC, linear)": ("fix(v, velocity_particles, all, 1, 0)", "velocity_particles"),
     "method(tlmpm, FLIP, linear, 0.9)": (
@@ -508,9 +528,6 @@ def test_what_a_solution_for_the_pressure_does_not_support_is_refused(run_interp
     change = {"head": f"{head}\nscheme(semi-implicit)", "tail": f"{tail}\nrun(1)"}
     err = run_interpreted(SCENE.format(**USUAL | change), status=1).err
     assert "semi-implicit" in err and words in err and err.count("error:") == 1
-    if "basis" in words:  # its word is marked
-        line, carets = err.splitlines()[1:3]
-        assert line.index("quadratic-spline") == carets.index("^" * len("quadratic-spline"))
 
 
 MISTAKES = [
@@ -520,6 +537,21 @@ MISTAKES = [
         "scheme semi-implicit solves for the pressure of pore water, and no solid has any",
     ),
     ({"kind": "axisymmetric(true)"}, (), "does not support axisymmetric scenes"),
+    (
+        {"head": "method(ulmpm/contacts, FLIP, linear, 1)\nscheme(semi-implicit)"},
+        (),
+        "does not support method ulmpm/contacts",
+    ),
+    (
+        {"head": "method(ulmpm, PolyPIC, cubic-spline)"},
+        (),
+        "does not support transfer PolyPIC",
+    ),
+    (
+        {"head": "method(ulmpm, FLIP, linear, 1)\nscheme(semi-implicit, iterations=20)"},
+        (),
+        "scheme(quasi-static, iterations=...)",
+    ),
     ({"water": "pore_water(clay, n=1, permeability=1e-3)"}, (), "the porosity is 1"),
     ({"water": "pore_water(clay, n=0.4)"}, (), "the permeability is missing"),
     ({"water": "pore_water(clay, n=0.4, permeability=0)"}, (), "above 0"),
@@ -531,6 +563,15 @@ MISTAKES = [
         "the permeability is missing",
     ),
     ({"water": "", "tail": "pore_water(clay, n=0.4, permeability=1)"}, (), "has this material"),
+    (
+        {
+            "water": "",
+            "tail": "fix(p, initial_pore_pressure, all, 0)\n"
+            "pore_water(clay, n=0.4, permeability=1)",
+        },
+        (),
+        "no solid has water",
+    ),
     ({"water": "", "tail": "fix(p, initial_pore_pressure, all, 0)"}, (), "no solid has water"),
     ({"tail": "group(n, nodes, region, body, all)\nfix(q, flux, n, 1, zhi)"}, (), "direction z"),
     (

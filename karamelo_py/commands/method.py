@@ -158,6 +158,9 @@ def auto(
 signature.FORMS[method] = {"auto": auto}
 
 
+OF_IMPLICIT = "tolerance", "iterations", "solver", "limit"
+
+
 def scheme(
     hub: Hub,
     style: Annotated[str, StyleOf("scheme")],
@@ -202,6 +205,8 @@ def scheme(
         if (pair := arguments[-1].keyword() if arguments else None) and not error.hint:
             error.hint = meant(pair[0], ["start"])
             error.expected = "start=full or start=half" if error.hint else error.expected
+            if pair[0] in OF_IMPLICIT and not error.expected:
+                error.expected = f"scheme({style}), or scheme(quasi-static, {pair[0]}=...)"
         for name in PUBLISHED:  # publishes the names, to avoid follow-up errors about them
             hub.values.publish(name)
         raise
@@ -222,7 +227,7 @@ def scheme(
             hub.values.publish(name)
 
 
-registry.may_differ(scheme, keywords=("tolerance", "iterations", "solver", "limit"))
+registry.may_differ(scheme, keywords=OF_IMPLICIT)
 
 
 def precision(hub: Hub, kind: Literal["double", "single"]) -> None:

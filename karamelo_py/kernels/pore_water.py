@@ -11,7 +11,15 @@ from karamelo_py.kernels.equations.move import Move
 from karamelo_py.kernels.equations.node_updates import NodalUpdate
 from karamelo_py.kernels.equations.strain import Strain
 from karamelo_py.kernels.export import imposing
-from karamelo_py.kernels.table import Added, AtNodes, BeforeLoads, NodeTask, Once, scene_additions
+from karamelo_py.kernels.table import (
+    AXIS,
+    Added,
+    AtNodes,
+    BeforeLoads,
+    NodeTask,
+    Once,
+    scene_additions,
+)
 from karamelo_py.points.basis.linear import Linear
 from karamelo_py.points.laws.pore_water import with_pore_pressure
 
@@ -67,21 +75,22 @@ def _additions_water(tag):
 
 
 def _foresee(s):
-    return pressures.Foresee(_rim(s), _surface(s))
+    return pressures.Foresee(None, _surface(s))
 
 
 def _add_pressure(s):
-    return pressures.AddPressure(_rim(s), _surface(s))
+    return pressures.AddPressure(None, _surface(s))
 
 
 def _make_flux_of_step(s):
-    return pores.MakeFlux(_rim(s), pores.OfStep())
+    return pores.MakeFlux(None, pores.OfStep())
 
 
 # Nodal velocities that fixes hold are known before the pressure is solved for.
 SOLVE = (
     NodeTask(pressures.ForgetVelocity()),
     AtNodes(arrays.POST_VELOCITIES_TO_GRID, arrays.ON_VELOCITY),
+    AXIS,
     NodeTask(pressures.Foresee, make=_foresee),
     Once(pressures.solve),
     NodeTask(pressures.AddPressure, make=_add_pressure),
@@ -89,13 +98,16 @@ SOLVE = (
 ADDITIONS_OF_SOLUTION = (
     (MassMomentum, OF_MASS),
     (BeforeLoads, BEFORE_LOADS),
-    (InternalForce, Added(then=(*OF_FORCE, pressures.SumsOfCells()))),
+    (
+        InternalForce,
+        Added(instead=pores.SoilForce(), then=(*OF_FORCE, pressures.SumsOfCells())),
+    ),
     (NodalUpdate, Added(before=SOLVE)),
     (Move, OF_MOVE_OF_STEP),
     (
         Strain,
         Added(
-            before=(NodeTask(pores.MakeFlux, make=_make_flux_of_step),),
+            before=(NodeTask(pores.MakeFlux, make=_make_flux_of_step), Once(pressures.grow)),
             first=(pores.Seep(),),
         ),
     ),

@@ -34,6 +34,7 @@ from karamelo_py.kernels.equations.periodic import (
     Seam,
     ask_to_sort,
 )
+from karamelo_py.kernels.equations.pore_water import clear_water_across
 from karamelo_py.kernels.records import clear_first
 from karamelo_py.kernels.sweep import OldWeights, PresentWeights, Visit
 from karamelo_py.points.transfers import NodalMass, stores_moment
@@ -344,7 +345,7 @@ def _after_others(row, s):
     if row.at:
         return (row,)
     additions = additions_of(row.task if row.make else type(row.task), s)
-    return *additions.before, row if additions.instead is None else additions.instead
+    return *plain(additions.before, s), row if additions.instead is None else additions.instead
 
 
 @in_scene.on(Sweep)
@@ -379,6 +380,7 @@ def _clear_radial(s, n):
         nodes.update[n, arrays.of_change(kin)] = 0
         nodes.velocity[n, 0] = 0
         clear_first(field(nodes.fields, Normal), n)
+        clear_water_across(nodes, kin, n)
 
 
 def _axis_of(grids, g):

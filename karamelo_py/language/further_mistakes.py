@@ -62,6 +62,8 @@ class Dependents:
             self.names |= _RUNS
         if name in ("pore_water", "solid"):
             self.names |= _OF_WATER | _RUNS
+        if not _OF_WATER.isdisjoint(word.code.strip() for word in statement.arguments[:2]):
+            self.names.add("pore_water")  # it should have preceded
         if name == "scheme":
             self.names.update(table()["implicit"].split())
         if name in _SCENE | _NAMED and statement.arguments:

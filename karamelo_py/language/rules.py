@@ -84,10 +84,14 @@ class Restrictions(NamedTuple):
 def compare(declared: Mapping[Feature, Restrictions], features: Iterable[Feature]) -> None:
     errors: dict[frozenset[str], ScriptError] = {}
     features = [*features, *declared]
+    excluded: set[str] = set()
     for subject, restrictions in declared.items():
+        if subject.words in excluded:
+            continue
         for feature in filter(restrictions.exclude, features):
             pair = frozenset((subject.words, feature.words))
             errors.setdefault(pair, restrictions.error(subject, feature))
+            excluded.add(feature.words)
     for error in errors.values():
         error.others = [*errors.values()][1:]
         raise error

@@ -4,7 +4,8 @@ from typing import NamedTuple
 
 from karamelo_py.kernels import table
 from karamelo_py.kernels.equations.node_updates import UpdateToVelocity
-from karamelo_py.kernels.equations.pore_pressure import CellPressures, CellSums, NodeResponse
+from karamelo_py.kernels.equations.pore_cells import CellGrowth, CellSums
+from karamelo_py.kernels.equations.pore_pressure import CellPressures, NodeResponse
 from karamelo_py.kernels.equations.strain import Strain
 from karamelo_py.kernels.table import NodeTask, any_node
 from karamelo_py.language.rules import Restrictions
@@ -25,16 +26,19 @@ class SemiImplicit(NamedTuple):
     loads that take longer than a wave in the dry soil takes to cross the ground. For consolidation
     over days or years, use quasi-static.
 
+    Volumes change with the cells, not point by point, so undrained soil does not lock. Use ulmpm
+    with quadratic-spline for soil that fails and spreads.
+
     Example
     -------
     scheme(semi-implicit)
 
     Notes
     -----
-    The scheme needs a material with pore_water, method tlmpm, FLIP or PIC and linear. Nodes of fix
-    seepage_face remain open or closed for a step, by the pressure at its beginning. Not supported:
-    bounds and friction in velocity_nodes; fixes local_damping, absorbing and ground_motion;
-    velocity_particles on soil; ``--ranks`` and ``--gpu``.
+    The scheme needs a material with pore_water; scenes are in 1D, plane strain, 3D, axisymmetric or
+    cylindrical. Nodes of fix seepage_face remain open or closed for a step, by the pressure at its
+    beginning. Not supported: bounds and friction in velocity_nodes; fixes local_damping, absorbing
+    and ground_motion; velocity_particles on soil; ``--ranks`` and ``--gpu``.
 
     See Also
     --------
@@ -49,11 +53,10 @@ class SemiImplicit(NamedTuple):
         solves_pressure=True,
         restrictions=Restrictions(
             "semi-implicit", "scheme(musl)",
-            only={"method": ("tlmpm",), "basis": ("linear",)},
             without=("single", "ranks", "gpu", "periodic", "yielding walls", "tools", "rigid"),
         ),
     )  # fmt: skip
-    node_fields = (CellSums, CellPressures, NodeResponse)
+    node_fields = (CellSums, CellPressures, CellGrowth, NodeResponse)
     rows = (
         table.BEGIN,
         table.SUMS,

@@ -1,11 +1,12 @@
 """Pore pressure at the end of a step, solved for on the grid (scheme semi-implicit).
 
 The forces of a step include the increment q of the pore pressure in the step, one value per cell
-(linear basis). With the gradients G of a cell at its nodes, P = G q is the force of the increment,
-and n P' is the part of it that acts on the water, where P' = P - B q_i at closed nodes
-(:mod:`~.pore_water`). The velocity v of the soil and the seepage velocity s = n w then change by
+(:mod:`~.pore_cells`). With the gradients G of a cell at its nodes, P = G q is the force of the
+increment, and e n P' is the part of it that acts on the water, where P' = P - B q_i at closed nodes
+and e is 1 except at edges (:func:`~.pore_water.edge`). The velocity v of the soil and the seepage
+velocity s = e n w then change by
 
-    dv = dt (P - f n P') / W,   dw = f (dt n P' / m - dv),   ds = n dw,
+    dv = dt (P - f e n P') / W,   dw = f (dt e n P' / m - dv),   ds = e n dw,
 
 with W = m_s + m (1 - f), and dv = 0 where a fix holds the node. The pressure of the law after the
 step has the same increment if, for each cell,
@@ -28,16 +29,27 @@ from typing import NamedTuple
 import numpy as np
 
 from karamelo_py.compiler import kernel, noinline, real
-from karamelo_py.compiler.fields import StepField, SummedField, field, numbers
+from karamelo_py.compiler.fields import StepField, field, numbers
 from karamelo_py.compiler.tuples import flat, record
 from karamelo_py.kernels import arrays
 from karamelo_py.kernels import equations as eq
 from karamelo_py.kernels.clock import NOT_SOLVED, step_size
 from karamelo_py.kernels.equations import pore_water as pores
 from karamelo_py.kernels.equations.node_updates import node_task
+from karamelo_py.kernels.equations.pore_cells import (
+    AREA,
+    STIFF,
+    VOLUME,
+    CellGrowth,
+    CellSums,
+    cell_fraction,
+    radius_of,
+)
 from karamelo_py.kernels.records import put_at
+from karamelo_py.points.basis.linear import Linear
 from karamelo_py.points.basis.product import digits
 from karamelo_py.points.grid import Grid
+from karamelo_py.points.kinematics import product
 from karamelo_py.points.kinematics import total as sum_of
 from karamelo_py.points.laws.pore_water import pore_stiffness
 
@@ -46,12 +58,10 @@ MOST = 4  # iterations / number of unknowns, at most
 KEPT = 0.97  # part of the neglected entries that is added to the diagonal of the preconditioner
 LEAST = 0.25  # least diagonal of the preconditioner / diagonal of the matrix
 
-# Columns of `CellSums`: volume; its product with K / n; columns of the volume as a stress.
-VOLUME, STIFF, AREA = 0, 1, 2
 # Columns of `CellPressures`: increment, residual, direction, product of matrix and direction;
 # diagonal, inverse diagonal of the preconditioner; preconditioned residual, scratch sum; number of
-# the step if the cell has water; entries of neighbours with lower numbers, by `_rank`.
-X, RESIDUAL, WAY, PRODUCT, DIAGONAL, INVERSE, AHEAD, SCRATCH, STEP, LOWER = range(10)
+# the step if the cell has water, growth of second order; entries of lower neighbours, by `_rank`.
+X, RESIDUAL, WAY, PRODUCT, DIAGONAL, INVERSE, AHEAD, SCRATCH, STEP, GROWTH, LOWER = range(11)
 # Columns of `NodeResponse`: vectors, then numbers.
 V_, S_, P_, MOBILE = range(4)  # times the dimension
 FN, N, SEEPS, CLOSED, SUM, STAYS = range(6)  # after 4 d columns
@@ -70,18 +80,8 @@ def _rank(way):
     return rank
 
 
-def _of_cells(kin):
-    return AREA + kin.dimension**2
-
-
 def _of_pressures(kin):
     return LOWER + _count_below(kin.dimension)
-
-
-class CellSums(SummedField):
-    """Sums over the points of a cell, at its first node."""
-
-    shape = staticmethod(_of_cells)
 
 
 class CellPressures(StepField):
@@ -107,19 +107,24 @@ def cell(pt):
     if not len(seen):
         return ()
     law, state = pt.law_and_state
-    V = seen.volumes[0]
-    return (V, V * pore_stiffness(law, pt.kin, state), *flat(seen.area.columns()))
+    V, area, d = seen.volumes[0], seen.area.at(), pt.kin.dimension
+    around = [sum_of([area[i, i] for i in range(d, d + pt.kin.hoops)])] if pt.kin.hoops else []
+    return (V, V * pore_stiffness(law, pt.kin, state), *flat(seen.area.columns()), *around)
+
+
+def of_cell(pt, node):
+    if not len(pt.cell):
+        return ()
+    if isinstance(node.w.basis, Linear):
+        return pt.cell if node.k == 0 else ()
+    fraction = cell_fraction(node)
+    return tuple([fraction * number for number in pt.cell])
 
 
 class SumsOfCells(eq.ExtensiveQuantity):
     says = "volumes of cells"
     takes = eq.of_point(cell=cell)
-    gives = (
-        eq.Sum(
-            eq.whole(CellSums),
-            lambda pt, node: pt.cell if node.k == 0 and len(pt.cell) else (),
-        ),
-    )
+    gives = (eq.Sum(eq.whole(CellSums), of_cell),)
 
 
 @node_task
@@ -154,8 +159,9 @@ class Foresee(NamedTuple):
         water, update = field(nodes.fields, pores.WaterSums), field(nodes.fields, pores.WaterUpdate)
         pores.close_if_dry(nodes, kin, n)
         drag, forces = pores.forces_at(task, kin, nodes, n, dt)
-        m, V, of_V = water[n, arrays.MASS], water[n, pores.of_volumes(kin)], pores.of_volumes(kin)
-        per_mass, per_volume, share = 1 / m, 1 / V, water[n, of_V + 1] / V
+        m, of_V = water[n, arrays.MASS], pores.of_volumes(kin)
+        per_mass, per_volume = 1 / m, pores.inverse_volume(nodes, kin, n)
+        share = water[n, of_V + 1] * per_volume * pores.edge(nodes, kin, n)
         across = real(0, dt)
         for k in range(d):
             on_water, force, v, w = forces[k]
@@ -172,7 +178,8 @@ class Foresee(NamedTuple):
         is_open = pores.is_open(nodes, n)
         closed = real(0, dt) if is_open else per_volume
         supply = real(0, dt) if is_open else pores.mass_given(nodes, kin, n, False)
-        supply *= water[n, of_V + 1] * per_mass * per_volume
+        if supply != 0:
+            supply *= water[n, of_V + 1] / pores.mass_of_flow(nodes, kin, n) * per_volume
         numbers = (drag.taken * share, share, dt * drag.taken * per_mass)
         put_at(out, n, 4 * d, (*numbers, closed, real(0, dt), closed * across + supply))
 
@@ -187,7 +194,7 @@ class System(NamedTuple):
     cells: np.ndarray
     pressures: np.ndarray
     nodes: np.ndarray
-    before: np.ndarray  # velocities of the soil before the step, in the first columns
+    before: np.ndarray  # velocities of the soil before the step or, for `grow`, after it (n, d)
     dt: float
     step: float
 
@@ -204,14 +211,21 @@ def _offset(steps, way):
     return total
 
 
+class CornerOfCell(NamedTuple):
+    way: list  # 0 or 1 per direction
+    offset: int  # from the first node of the cell
+    slopes: list  # gradient at the centre
+    grid: Grid
+
+
 def _corners(kin, grid):
-    """List a cell's nodes: digits, offset from the first node, and gradient at the centre."""
     d = kin.dimension
     steps, slope = _steps(kin, grid), 0.5 ** (d - 1) * grid.inv_h
     corners = []
     for k in range(2**d):
         way = digits(k, 2, d)
-        corners.append((way, _offset(steps, way), [slope if far else -slope for far in way]))
+        slopes = [slope if far else -slope for far in way]
+        corners.append(CornerOfCell(way, _offset(steps, way), slopes, grid))
     return corners
 
 
@@ -222,16 +236,32 @@ def _below(kin, grid):
     return [_offset(steps, way) for way in ways]
 
 
-def _row(system, c, slopes):
-    """Return the force (d,) at a corner due to a unit increment in cell `c`."""
+def _in_plane(system, c, corner):
+    """Return the force (d,) at a corner due to a unit increment in cell `c`, without hoops."""
     d, cells = system.kin.dimension, system.cells
     force = []
     for k in range(d):
         total = 0.0
         for j in range(d):
-            total = total + cells[c, AREA + j * d + k] * slopes[j]
+            total = total + cells[c, AREA + j * d + k] * corner.slopes[j]
         force.append(total)
     return force
+
+
+def _of_hoops(system, c, corner):
+    d, grid = system.kin.dimension, corner.grid
+    r = radius_of(grid, (c - grid.first) // grid.step_x)
+    return 0.5**d * system.cells[c, AREA + d * d] / r
+
+
+def _row(system, c, corner):
+    """Return the force (d,) at a corner due to a unit increment in cell `c`."""
+    force, grid = _in_plane(system, c, corner), corner.grid
+    if not system.kin.hoops:
+        return force
+    on_axis = abs(grid.x0) <= grid.slack * grid.h and c - grid.first < grid.step_x
+    radial = force[0] + _of_hoops(system, c, corner)
+    return [0.0 if corner.way[0] == 0 and on_axis else radial, *force[1:]]
 
 
 def _grid_of(grids, n):
@@ -263,17 +293,32 @@ def _outflow(system, c, corners):
     breaks soft soil.
     """
     nodes, d, V = system.nodes, system.kin.dimension, system.cells[c, VOLUME]
-    seen = [(c + offset, _row(system, c, slopes)) for _, offset, slopes in corners]
     flow, stays = 0.0, 0.0
-    for n, force in seen:
+    for corner in corners:
+        n, force = c + corner.offset, _row(system, c, corner)
         for k in range(d):
             flow += force[k] * (nodes[n, V_ * d + k] + nodes[n, S_ * d + k])
         stays += nodes[n, 4 * d + STAYS]
+    growth = _second_order(system, c, corners)
+    system.pressures[c, GROWTH] = growth
+    return flow + V / system.dt * growth - 0.5**d * V * stays
+
+
+def _second_order(system, c, corners):
+    """Return the growth of a cell's volume beyond the trace of the increment."""
+    d, per_volume = system.kin.dimension, system.dt / system.cells[c, VOLUME]
+    seen = [(c + corner.offset, corner, _in_plane(system, c, corner)) for corner in corners]
     H = [
-        [system.dt / V * sum_of([f[k] * system.before[n, i] for n, f in seen]) for k in range(d)]
+        [per_volume * sum_of([f[k] * system.before[n, i] for n, _, f in seen]) for k in range(d)]
         for i in range(d)
     ]
-    return flow + V / system.dt * _growth(d, H) - 0.5**d * V * stays
+    growth, hoops = _growth(d, H), system.kin.hoops
+    if hoops:
+        rates = [_of_hoops(system, c, corner) * system.before[n, 0] for n, corner, _ in seen]
+        around = per_volume / hoops * sum_of(rates)
+        in_plane = 1 + growth + sum_of([H[k][k] for k in range(d)])
+        growth = growth + in_plane * (product([1 + around] * hoops) - 1) - hoops * around
+    return growth
 
 
 @noinline
@@ -292,17 +337,16 @@ def _begin(system):
 
 def _seen(system, n, corner):
     """Return a cell at node `n`, 1 if it has water (else 0), and its forces on soil and water."""
-    _, offset, slopes = corner
     nodes, d, cells = system.nodes, system.kin.dimension, system.cells
     wet = 0.0
-    c = n - offset
+    c = n - corner.offset
     if c < 0:
         c = 0
     elif system.pressures[c, STEP] == system.step:
         wet = 1.0
     mean = 0.5**d * cells[c, VOLUME] * nodes[n, 4 * d + CLOSED]
     area, fn = pores.of_pressure(system.kin) + d, nodes[n, 4 * d + FN]
-    force = _row(system, c, slopes)
+    force = _row(system, c, corner)
     on_water = [wet * (force[k] - system.sums[n, area + k] * mean) for k in range(d)]
     return c, wet, [wet * force[k] - fn * on_water[k] for k in range(d)], on_water
 
@@ -324,12 +368,12 @@ def _assemble(system):
         corners = _corners(system.kin, _grid_of(system.grids, system.spans[r, 0]))
         for n in range(system.spans[r, 0], system.spans[r, 1]):
             seen = [_seen(system, n, corner) for corner in corners]
-            for k, (way, _, _) in enumerate(corners):
+            for k, one in enumerate(corners):
                 a = seen[k]
                 if a[1] > 0:
                     pressures[a[0], DIAGONAL] += _entry(system, n, a, a)
-                for j, (other, _, _) in enumerate(corners):
-                    rank = _rank([x - y for x, y in zip(way, other, strict=True)])
+                for j, other in enumerate(corners):
+                    rank = _rank([x - y for x, y in zip(one.way, other.way, strict=True)])
                     if rank < below:
                         b = seen[j]
                         if a[1] * b[1] > 0:
@@ -447,11 +491,11 @@ def _scatter(system):
             V = system.cells[c, VOLUME]
             if V > 0:
                 q = system.pressures[c, X]
-                for _, offset, slopes in corners:
-                    force = _row(system, c, slopes)
+                for corner in corners:
+                    n, force = c + corner.offset, _row(system, c, corner)
                     for k in range(d):
-                        nodes[c + offset, P_ * d + k] += q * force[k]
-                    nodes[c + offset, 4 * d + SUM] += 0.5**d * V * q
+                        nodes[n, P_ * d + k] += q * force[k]
+                    nodes[n, 4 * d + SUM] += 0.5**d * V * q
 
 
 @kernel
@@ -475,15 +519,41 @@ def _solve(system):
     return size <= goal or goal != goal
 
 
-def solve(s):
-    """Add the forces of the increments of pressure to `NodeResponse`; return False on failure."""
-    kinds = pores.WaterSums, CellSums, CellPressures, NodeResponse, pores.WaterUpdate
+def _system(s, velocities):
+    kinds = pores.WaterSums, CellSums, CellPressures, NodeResponse
     of_fields = [field(s.nodes.fields, kind) for kind in kinds]
     step = s.control.values[arrays.TIMESTEP] + 1
-    solved = _solve(System(s.kin, s.grids, s.spans, *of_fields, step_size(s), step))
+    return System(s.kin, s.grids, s.spans, *of_fields, velocities, step_size(s), step)
+
+
+def solve(s):
+    """Add the forces of the increments of pressure to `NodeResponse`; return False on failure."""
+    solved = _solve(_system(s, field(s.nodes.fields, pores.WaterUpdate)))
     if not solved:
         s.control.motion[0].wrong = NOT_SOLVED
     return solved
+
+
+@kernel
+def _grow(system, growth):
+    for r in range(1, 1 + system.spans[0, 0]):
+        corners = _corners(system.kin, _grid_of(system.grids, system.spans[r, 0]))
+        for c in range(system.spans[r, 0], system.spans[r, 1]):
+            V, total = system.cells[c, VOLUME], 0.0
+            if V > 0:
+                for corner in corners:
+                    force = _row(system, c, corner)
+                    for k in range(system.kin.dimension):
+                        total += force[k] * system.before[c + corner.offset, k]
+                total = system.dt / V * total + system.pressures[c, GROWTH]
+            growth[c, 0] = total
+
+
+def grow(s):
+    """Set `CellGrowth` by the velocities of the step."""
+    growth = field(s.nodes.fields, CellGrowth)
+    if growth is not None:
+        _grow(_system(s, s.nodes.velocity), growth)
 
 
 @node_task

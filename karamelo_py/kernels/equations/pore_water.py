@@ -8,7 +8,8 @@ prescribed pressure at open nodes and the mean pressure at others. There is no f
 nodes that are not open.
 
 The flux is j = m / V (v_w - v_s) at nodes. Pressure rate and force use the same gradients: with a
-linear basis at the cell centre (one pressure rate per cell), otherwise at the points. With splines,
+linear basis at the cell centre (one pressure rate per cell), otherwise at the points; if pressures
+are solved for, by cells with any basis (:mod:`~.pore_cells`). In explicit steps with splines,
 volume strains e and pressures p in the null space of the grid would grow. Therefore in each step R
 (1 - S)^2 e is subtracted from e, in soil and pores, where R = 1/5 and S maps to the nodes and back,
 and R / (1 + b) (1 - S)^2 p from p, in pores only, with b as below. At edges S does not reproduce a
@@ -42,11 +43,12 @@ from karamelo_py.compiler.fields import (
     store_from,
     vector,
 )
+from karamelo_py.compiler.powers import power
 from karamelo_py.compiler.tuples import count_in
 from karamelo_py.kernels import arrays
 from karamelo_py.kernels import equations as eq
 from karamelo_py.kernels.equations.fbar import VolumeCorrection
-from karamelo_py.kernels.equations.internal_force import WorkOfForces
+from karamelo_py.kernels.equations.internal_force import InternalForce, WorkOfForces, force_at
 from karamelo_py.kernels.equations.mass_momentum import MassMomentum, MomentumAgain
 from karamelo_py.kernels.equations.node_updates import (
     NodalUpdate,
@@ -54,11 +56,18 @@ from karamelo_py.kernels.equations.node_updates import (
     at_node,
     node_task,
 )
+from karamelo_py.kernels.equations.pore_cells import (
+    CellGrowth,
+    are_solved,
+    by_cells,
+    cell_fraction,
+    cell_grad,
+    cell_N,
+)
 from karamelo_py.kernels.equations.strain import increment
-from karamelo_py.kernels.records import put_at, row
+from karamelo_py.kernels.records import clear_first, put_at, row
 from karamelo_py.points import laws
 from karamelo_py.points.basis.linear import Linear
-from karamelo_py.points.basis.product import digits
 from karamelo_py.points.frames import force_stress, spatial_increment
 from karamelo_py.points.kinematics import I, det, dot, nothing, outer, zero
 from karamelo_py.points.kinematics import total as sum_of
@@ -177,19 +186,12 @@ def _is_wet(pt):
 
 
 def pore_N(node):
-    if not isinstance(node.w.basis, Linear):
-        return node.N
-    return real(0.5**node.kin.dimension, node.N)
+    return cell_N(node) if by_cells(node.w) else node.N
 
 
 def pore_grad(node):
-    """Return the gradient for pressure and flux, at the cell centre with a linear basis."""
-    if not isinstance(node.w.basis, Linear):
-        return node.grad_N
-    d = node.kin.dimension
-    slope = real(0.5 ** (d - 1), node.N) * node.w.grid.inv_h
-    signs = [2 * digit - 1 for digit in digits(node.k, 2, d)]
-    return node.grad_N._make([slope if sign > 0 else -slope for sign in signs])
+    """Return the gradient for pressure and flux."""
+    return cell_grad(node) if by_cells(node.w) else node.grad_N
 
 
 @eq.reads("mass", "state", "material")
@@ -216,7 +218,7 @@ class WetPoint(NamedTuple):
     m: arrays.Number  # mass of the water, () if dry
     w: tuple  # velocity of the water relative to the soil
     drag: arrays.Number  # force per unit relative velocity
-    volumes: tuple  # of point and pores; products with pressure and (splines) strain
+    volumes: tuple  # of point and pores, times pressure; with splines, times strain, or content
     unseen: tuple  # products of volume and unseen strain and pressure (splines)
     p: arrays.Number
     area: tuple  # volume times the unit tensor, in the frame of the gradients
@@ -234,12 +236,19 @@ def pores(pt):
     kin, J = pt.kin, laws.jacobian(law, pt.kin, state)
     V0 = eq.mass(pt) * laws.specific_volume(law)
     V, n, p = V0 * J, porosity(law, kin, state), pore_pressure(law, kin, state)
-    strains = () if isinstance(pt.w.basis, Linear) else pt.load(VolumeStrain, (V,) * 3)
+    strains = () if by_cells(pt.w) else pt.load(VolumeStrain, (V,) * 3)
     area = V0 * force_stress(pt.w.frame, kin, nothing(kin) + J * I, f)
     drag = V * drag_at(law.permeability, law, n)
     strain, unseen = _times(V, strains[:1]), _times(V, strains[1:])
-    content, volumes = V0 * water_content(law, kin, state), (V, V * n, V * p, *strain)
+    content, volumes = V0 * water_content(law, kin, state), (V, V0 * state.pores, V * p, *strain)
+    if are_solved(pt.w.nodes):
+        volumes = (*volumes, content)
     return WetPoint(content, water_w(pt), drag, volumes, unseen, p, area)
+
+
+def trace(tensor):
+    a = tensor.at()
+    return sum_of([a[i, i] for i in tensor.axes])
 
 
 class OfWater(NamedTuple):
@@ -260,7 +269,7 @@ def _affine_volumes(pt, w):
     if not len(pt.pores):
         return ()
     if not isinstance(w.basis, Linear):
-        return pt.pores.volumes, ()
+        return () if by_cells(w) else (pt.pores.volumes, ())
     return eq.Unweighted(_times(0.5**w.kin.dimension, pt.pores.volumes), ())
 
 
@@ -273,7 +282,7 @@ def _force_and_area_at(pt, node):
 
 def _affine_force_and_area(pt, w):
     # Gradients at a cell's centre differ only in sign.
-    if not (len(pt.pores) and isinstance(w.basis, Linear)):
+    if not (len(pt.pores) and isinstance(w.basis, Linear)) or w.kin.hoops:
         return ()
     p, slope = pt.pores.p, 0.5 ** (w.kin.dimension - 1) * w.grid.inv_h
     steps = [slope * column for column in pt.pores.area.columns()]
@@ -367,6 +376,31 @@ class WaterForce(eq.ExtensiveQuantity):
     gives = (eq.Sum(PRESSURE, _force_and_area_at, _affine_force_and_area),)
 
 
+@eq.reads("mass", "state", "material", "deformation gradient")
+def soil_pressure(pt):
+    """Return minus the mean effective stress times `WetPoint.area`, or ()."""
+    if not _is_wet(pt) or isinstance(pt.w.basis, Linear):
+        return ()
+    law, state, f = pt.law_state_F
+    V0 = eq.mass(pt) * laws.specific_volume(law)
+    tau = laws.kirchhoff_stress(law, pt.kin, state).mean_of_stretching()
+    return -V0 * force_stress(pt.w.frame, pt.kin, nothing(pt.kin) + tau * I, f)
+
+
+def _soil_force_at(pt, node):
+    force = force_at(pt, node)
+    if not len(pt.soil):
+        return force
+    return force + pt.soil.dot(pore_grad(node)) - pt.soil.dot(node.grad_N)
+
+
+class SoilForce(InternalForce):
+    """Internal force whose mean effective stress is conjugate to the volume rates of cells."""
+
+    takes = eq.of_point(**InternalForce.takes, soil=soil_pressure)
+    gives = (eq.Sum(eq.FORCE, _soil_force_at), *InternalForce.gives[1:])
+
+
 class WaterMomentumAgain(eq.ExtensiveQuantity):
     says = "momentum of the water to grid"
     takes = eq.of_point(water=water, w=water_w)
@@ -414,7 +448,30 @@ def close_if_dry(nodes, kin, n):
 
 
 def _is_closed(nodes, kin, n, rim):
-    return not is_open(nodes, n) and _is_rim(nodes, kin, n, rim)
+    has_volume = field(nodes.fields, WaterSums)[n, of_volumes(kin)] > 0
+    return has_volume and not is_open(nodes, n) and _is_rim(nodes, kin, n, rim)
+
+
+def mass_of_flow(nodes, kin, n):
+    """Return the mass of water of a node by the volumes of cells, if pressures are solved for."""
+    of_mass = of_volumes(kin) + 3 if are_solved(nodes) else arrays.MASS
+    return field(nodes.fields, WaterSums)[n, of_mass]
+
+
+def edge(nodes, kin, n):
+    """Return e = sqrt(m / `mass_of_flow`), which differs from 1 at edges and in part-filled cells.
+
+    With the pressure force e n P' and the flux e n w, the equation of the pressure is symmetric and
+    its permeability exact; with the weight g m / e, hydrostatic pressures are exact, too.
+    """
+    m, one = field(nodes.fields, WaterSums)[n, arrays.MASS], mass_of_flow(nodes, kin, n)
+    return sqrt(m / one) if are_solved(nodes) and one > 0 else real(1, m)
+
+
+def inverse_volume(nodes, kin, n):
+    """Return 1 / V of a wet node, or 0 if no cell next to it has water."""
+    V = field(nodes.fields, WaterSums)[n, of_volumes(kin)]
+    return 1 / V if V > 0 else real(0, V)
 
 
 def _by_pressure(nodes, kin, n, rim):
@@ -425,12 +482,12 @@ def _by_pressure(nodes, kin, n, rim):
     """
     sums, d, of_P = field(nodes.fields, WaterSums), kin.dimension, of_pressure(kin)
     of_V, p = of_volumes(kin), real(0, sums[n, 0])
-    per_volume = 1 / sums[n, of_V]
+    per_volume = inverse_volume(nodes, kin, n)
     if is_open(nodes, n):
         p = field(nodes.fields, GivenPressure)[n, 0]
     elif _is_rim(nodes, kin, n, rim):
         p = sums[n, of_V + 2] * per_volume
-    share = sums[n, of_V + 1] * per_volume
+    share = sums[n, of_V + 1] * per_volume * edge(nodes, kin, n)
     return [share * (sums[n, of_P + k] - sums[n, of_P + d + k] * p) for k in range(d)], p
 
 
@@ -459,10 +516,19 @@ def mass_given(nodes, kin, n, store):
     return whole
 
 
+def clear_water_across(nodes, kin, n):
+    """Clear the radial components of a node on the axis."""
+    sums, d = field(nodes.fields, WaterSums), kin.dimension
+    if sums is not None:
+        for first in (arrays.of_momentum(kin), arrays.of_force(kin), of_pressure(kin)):
+            sums[n, first] = 0
+        sums[n, of_pressure(kin) + d] = 0
+        clear_first(field(nodes.fields, WaterAgain), n)
+
+
 def is_wet_node(nodes, kin, n):
     sums = field(nodes.fields, WaterSums)
-    soil, water = nodes.sums[n, arrays.MASS], sums[n, arrays.MASS]
-    return soil > 0 and water > 0 and sums[n, of_volumes(kin)] > 0
+    return nodes.sums[n, arrays.MASS] > 0 and sums[n, arrays.MASS] > 0
 
 
 class DragAt(NamedTuple):
@@ -488,15 +554,17 @@ def forces_at(task, kin, nodes, n, dt):
         along /= squared
     per_mass, per_soil = 1 / m, 1 / m_s
     left, taken = _taken_up(dt * D * per_mass)
-    forces = []
+    per_edge, forces = 1 / edge(nodes, kin, n), []
     for k in range(d):
         of_force, of_momentum = arrays.of_force(kin) + k, arrays.of_momentum(kin) + k
         by_pressure = pushed[k]
         carried = along * water[n, of_P + d + k]
-        on_water = water[n, of_force] - carried + by_pressure
+        by_weight = per_edge * (water[n, of_force] - carried)
+        on_water = by_weight + by_pressure
         v = nodes.sums[n, of_momentum] * per_soil
         w = water[n, of_momentum] * per_mass
-        rest = nodes.sums[n, of_force] + carried + water[n, of_P + k] - by_pressure
+        rest = nodes.sums[n, of_force] + water[n, of_force] - by_weight
+        rest += water[n, of_P + k] - by_pressure
         forces.append((on_water, rest + (1 - taken) * on_water + D * taken * w, v, w))
     return DragAt(m_s, left, taken, m_s + m * (1 - taken)), forces
 
@@ -619,17 +687,18 @@ class MakeFlux(NamedTuple):
             return
         water, again = field(nodes.fields, WaterSums), field(nodes.fields, WaterAgain)
         out, of_V, of_area = field(nodes.fields, WaterUpdate), of_volumes(kin), of_pressure(kin) + d
-        m, V = water[n, arrays.MASS], water[n, of_V]
+        m = water[n, arrays.MASS]
         pushed, p = _by_pressure(nodes, kin, n, task.rim)
-        per_mass, per_volume = 1 / m, 1 / V
+        per_mass, per_volume = 1 / m, inverse_volume(nodes, kin, n)
         if of_step:
             momentum = [m * out[n, k] for k in range(d)]
         else:
             kept = m * out[n, 2 * d]
             momentum = [again[n, k] + kept * out[n, 2 * d + 1 + k] for k in range(d)]
+        per_m = per_volume / edge(nodes, kin, n)
         for k in range(d):
-            flux[n, k] = momentum[k] * per_volume
-            across += momentum[k] * per_volume * water[n, of_area + k]
+            flux[n, k] = momentum[k] * per_m
+            across += momentum[k] * per_m * water[n, of_area + k]
         drained = is_open(nodes, n)
         if not of_step:
             enters = field(nodes.fields, GivenPressure)[n, 1] == 1 and across < 0
@@ -645,7 +714,8 @@ class MakeFlux(NamedTuple):
             put_at(flux, n, d + 1, [water[n, column] * per_volume for column in columns])
         # With the mean relative velocity in the step, the remaining work is the work of weight
         # minus the work of drag, and the work of pressure on water that enters or leaves.
-        work = dt * (supply - leaves) * p * water[n, of_V + 1] * per_mass
+        one = mass_of_flow(nodes, kin, n)
+        work = dt * (supply - leaves) * p * water[n, of_V + 1] / one if one > 0 else real(0, dt)
         for k in range(d):
             beyond = out[n, 2 * d + 1 + k]
             dragged = beyond if of_step else out[n, 2 * d] * beyond
@@ -695,6 +765,16 @@ class MoveWater(eq.Task):
         return eq.Report(real(0, pt.dt), fastest)
 
 
+def _volume_rate(node, total, g):
+    """Add a node to the gradient with a linear basis, or to the growth of cells."""
+    if not len(total):
+        return ()
+    if isinstance(node.w.basis, Linear):
+        return total + outer(node.v, g)
+    (growth,) = row(node.of(CellGrowth), node.i, 0, total)
+    return (total[0] + cell_fraction(node) * growth,)
+
+
 class Seep(eq.Task):
     """Gathers the flux before `Strain`; updates water, pores and the water's velocity."""
 
@@ -705,8 +785,8 @@ class Seep(eq.Task):
     def empty(task, w, x):
         none, tensor = real(0, x[0]), zero(w.kin, x[0])
         spread = none if w.frame.moves else tensor
-        if isinstance(w.basis, Linear):
-            return spread, none, (), tensor
+        if by_cells(w):
+            return spread, none, (), tensor if isinstance(w.basis, Linear) else (none,)
         return spread, none, (none,) * 4, ()  # `Strain` gathers the gradient
 
     def gathered(task, node, total):
@@ -717,32 +797,43 @@ class Seep(eq.Task):
         some = row(node.of(Flux), node.i, 0, (*g[:d], kept, *means))
         j, pairs = node.v._make(some[:d]), zip(means, some[d + 1 :], strict=True)
         return (
-            spread + (dot(j, g) if node.w.frame.moves else outer(j, g)),
+            spread + (trace(outer(j, g)) if node.w.frame.moves else outer(j, g)),
             kept + pore_N(node) * some[d],
             tuple([mean + node.N * at_node for mean, at_node in pairs]),
-            gradient + outer(node.v, g) if len(gradient) else (),
+            _volume_rate(node, gradient, g),
         )
 
     def updated(task, pt, total, totals, fastest):
         if not _is_wet(pt):
             return eq.Report(real(0, pt.dt), fastest)
         spread, kept, means, gradient = total
-        if not len(gradient):
-            gradient = totals[-1][0]
-        law, old, f = pt.law_state_F
+        at_point, (law, old, f) = totals[-1][0], pt.law_state_F
         frame, kin = pt.w.frame, pt.kin
         leaving = spread
         if not frame.moves:
-            leaving = sum_of(spatial_increment(frame, kin, spread, f).diagonal())
-        content = old.content - pt.dt * laws.jacobian(law, kin, old) * (leaving - kept)
-        grown = det(I + spatial_increment(frame, kin, increment(pt.dt, gradient), f))
-        pores = old.pores * grown + (1 - law.n) * (grown - 1)
+            leaving = trace(spatial_increment(frame, kin, spread, f))
+        jacobian = laws.jacobian(law, kin, old)
+        content = old.content - pt.dt * jacobian * (leaving - kept)
+
+        def growth(gradient):
+            return det(I + spatial_increment(frame, kin, increment(pt.dt, gradient), f))
+
+        if isinstance(pt.w.basis, Linear):
+            grown = growth(gradient)
+        elif are_solved(pt.w.nodes):
+            grown, axes = 1 + gradient[0], len(at_point.axes)
+            ratio = power(grown / growth(at_point), 1 / axes)
+            store(pt.of(VolumeCorrection), pt.p, (axes * (ratio - 1),))
+        else:
+            grown = growth(at_point)
+        # Initial stresses change J but not the pores.
+        pores = old.pores + jacobian * (grown - 1)
         if len(means):
             mean, again, p, p_again = means
             strain, unseen, p_unseen = pt.load(VolumeStrain, (mean,) * 3)
             change, n = real(SMOOTHING, mean) * (again - unseen), porosity(law, kin, old)
             b = pt.dt * drag_at(law.permeability, law, n) / (n * law.rho)
-            pores = pores + change * (pores + (1 - law.n))
+            pores = pores + change * jacobian * grown
             pores = pores * (1 + SMOOTHING / (1 + b) / law.K * (p_unseen - p_again))
             store(pt.of(VolumeCorrection), pt.p, (change,))
             later = strain + (1 + strain) * (grown * (1 + change) - 1)

@@ -21,7 +21,8 @@ RESTRICTIONS = Restrictions(
           "basis": HATS_AND_SPLINES, "scheme": ("musl", "semi-implicit", "quasi-static"),
           "kinematics": FLAT},
     without=("heat", "delete", "reflect", "thin"),
-    but={"single": "precision(double): water is stiff",
+    but={"kinematics": "1D, plane strain or 3D; axisymmetric or cylindrical with semi-implicit",
+         "single": "precision(double): water is stiff",
          "F-bar": "no anti_volumetric_locking: the pressure of the water does not lock"},
 )  # fmt: skip
 
@@ -50,8 +51,12 @@ class PoreWater(NamedTuple):
 
     @property
     def restrictions(self) -> Restrictions:
-        slow = {**RESTRICTIONS.only, "scheme": ("quasi-static",)}
-        return RESTRICTIONS if self.suction == self.K else RESTRICTIONS._replace(only=slow)
+        only = dict(RESTRICTIONS.only)
+        if self.suction < self.K:
+            only["scheme"] = ("quasi-static",)
+        elif self.update.scheme.traits.solves_pressure:
+            only["kinematics"] = *FLAT, "axisymmetric", "cylindrical"
+        return RESTRICTIONS._replace(only=only)
 
     def around(self, law: NamedTuple) -> NamedTuple:
         solved = self.update.scheme.traits.solves_pressure
