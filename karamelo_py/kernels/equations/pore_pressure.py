@@ -142,7 +142,7 @@ class ForgetVelocity(NamedTuple):
 class Foresee(NamedTuple):
     """Computes the velocities that a step would have with the pressure at its beginning."""
 
-    rim: float
+    rim: float | None
     surface: float
 
     says = "velocities before the pressure changes"
@@ -560,7 +560,7 @@ def grow(s):
 class AddPressure(NamedTuple):
     """Adds the increment to the force and the mean of the pressure; sets the forces for fixes."""
 
-    rim: float
+    rim: float | None
     surface: float
 
     says = "forces on soil and water with the new pressure"
