@@ -279,8 +279,8 @@ HELD_OUT = {
     "disk_2": Scene(
         f"{IN}.energy_disk", lambda r: abs(r.log.E[-60:].mean() / r.log.E[:60].mean() - 1),
         ("5", "8"), "n", more=("periods", 15, "strain", 0.02)),
-    "plane_flow_27": Scene(
-        f"{D}.plane_flow", partial(plane_flow.scatter, degrees=27), more=("angle", radians(27))),
+    "plane_flow_26": Scene(
+        f"{D}.plane_flow", partial(plane_flow.scatter, degrees=26), more=("angle", radians(26))),
     "cooling_steel": Scene(f"{V}.cooling", last("mean", "exact"), more=("kappa", 50)),
 }  # fmt: skip
 SCENES = {**SEEN, **UNSEEN, **HELD_OUT}
