@@ -8,6 +8,7 @@ from karamelo_py.points.bodies import MinimizePenetration
 from karamelo_py.points.kinematics import KINEMATICS
 
 H = 0.1
+SPRINGS = "contact/minimize_penetration, a, b"
 MINIMIZE = "contact/minimize_penetration, a, b, 0"
 
 
@@ -105,6 +106,21 @@ def test_force_of_minimize_penetration(run_interpreted, d):
     assert "bx" not in result.err
 
 
+def test_force_of_springs(run_interpreted):
+    """m/2 rate p, as stiff as the step allows above a tenth of R1 + R2 = 0.1 (here above p).
+
+    The rate is s (rho c^2/h) over m/2 per area; c^2 = (lambda + 2 G)/rho, R = h/2, rho = 1.
+    """
+    fast = 100 * 0.7 / (1.3 * 0.4)
+    log = run_interpreted(two_points(f"{SPRINGS}, stiffness=0.5", 2)).log
+    soft = 0.5 * 0.01 * 0.01 * 0.5 * 2 * fast / 0.01
+    assert log.c_x[-1] == pytest.approx(-soft, rel=1e-8)
+    deeper = two_points(f"{SPRINGS}, stiffness=0.5", 2).replace("0.59,", "0.57,")
+    stiff = 0.5 * 0.01 * 0.02 / 1e-6 * (1 - 0.5 * 2 * fast * 1e-6 / 0.01)
+    force = run_interpreted(deeper).log.c_x[-1]
+    assert force == pytest.approx(-3 * soft - stiff, rel=1e-8)
+
+
 @pytest.mark.parametrize("slip, share", [(50, 0.2), (-50, -0.2), (0.5, 0.05)])
 def test_friction_of_two_points(run_interpreted, slip, share):
     """mu times the force across, along the slip of the other; at most what stops it (m/2 v/dt)."""
@@ -141,6 +157,23 @@ def test_collision(run_script, d):
         assert energy[-1] > 0.7 * energy[0]
         assert log.va_x[-1] < -0.06
         assert log.c_x[-1] == 0
+
+
+def test_springs_keep_energy(run_script):
+    """Elastic bars part with the speeds at which they met, with any step.
+
+    The surface nodes have a twelfth of the energy, most of which stiff contact takes.
+    """
+    kept = []
+    for factor, more in ((0.3, ""), (0.3, ", stiffness=0.25"), (0.1, ", stiffness=0.25")):
+        lines = ("log_modify(custom, step, time, va_x, vb_x, k, e)", f"dt_factor({factor})",
+                 "set_output(1000)", "run_time(3)")  # fmt: skip
+        log = run_script(bodies(0.02, SPRINGS + more, *lines, n=6, v=0.01)).log
+        assert abs(log.va_x[-1] + log.vb_x[-1]) < 1e-15
+        kept.append((log.k + log.e)[-1] / log.k[0])
+    assert kept[0] < 0.95
+    assert kept[1:] == pytest.approx([1, 1], abs=0.012)
+    assert log.va_x[-1] == pytest.approx(-0.01, rel=0.03)
 
 
 def test_hertz_collision(run_script):

@@ -8,6 +8,7 @@ from karamelo_py.compiler.powers import power
 from karamelo_py.points.kinematics import dot, product
 
 NEW = 0.05  # weight of the last step in the mean load
+DEEP = 0.1  # overlap above which springs are as stiff as the step allows, in sums of the radii
 
 
 class Hertz(NamedTuple):
@@ -26,6 +27,13 @@ class MeetingFaces(NamedTuple):
     """Removes the overlap of two faces within a step, with Coulomb friction."""
 
     friction: float
+
+
+class Springs(NamedTuple):
+    """Springs with Coulomb friction; deep overlaps are removed as by `MinimizePenetration`."""
+
+    friction: float
+    rate: float  # stiffness / reduced mass
 
 
 def face(kin, volume, x):
@@ -110,6 +118,17 @@ def _force_between_faces(law, kin, pair):
     reduced = mass1 * mass2 / (mass1 + mass2) * common / (narrow if narrow > 0 else 1.0)
     stiffness = reduced / (pair.dt * pair.kick) if touching else 0.0
     return -stiffness * p * normal, stiffness
+
+
+@force_between.on(Springs)
+def _force_between_springs(law, kin, pair):
+    """Return minus the derivative of an energy of the overlap, as long as the step is constant."""
+    (radius1, radius2), (mass1, mass2) = pair.radii, pair.masses
+    reduced, both = mass1 * mass2 / (mass1 + mass2), radius1 + radius2
+    p = both - pair.r
+    most = 1 / (pair.dt * pair.kick)
+    push = law.rate * p + max(most - law.rate, 0.0) * max(p - DEEP * both, 0.0)
+    return -reduced * push / pair.r * pair.dx, reduced * most
 
 
 class FrictionMemory(NamedTuple):
