@@ -186,8 +186,8 @@ class ContactMinimizePenetration(PairContact):
     mu
         Coefficient of friction (Coulomb).
     stiffness
-        Stiffness of the contact per area over that of a cell, rho c^2 / h, with the speed c of
-        P waves. Without it, contact is as stiff as the step allows.
+        Stiffness of the contact per area, over the stiffness rho c^2 / h of a cell (c: speed of
+        P waves). Without it, contact is as stiff as the step allows.
 
     Example
     -------
