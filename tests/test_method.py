@@ -196,7 +196,7 @@ def fluid(eos, strength="fluid, 0"):
          "method(ulmpm, APIC, cubic-spline, mass=corrected)"),
         (fluid("ideal-gas, 1, 1.4, p=1, Q1=0.1, Qh=3"),
          "fix(v, initial_velocity_particles, all, 9, 0)",
-         "method(ulmpm, APIC, cubic-spline, thermo-mechanical); scheme(usavg)"),
+         "method(ulmpm, TPIC, cubic-spline, thermo-mechanical); scheme(usavg)"),
         (fluid("linear, 1000, 1e6", "mohr-coulomb, 5e5, 1e3, 30"), "",
          "method(ulmpm, FLIP, quadratic-spline, 0.99)"),
         (fluid("linear, 1000, 1e6", "plastic, 5e5, 1e3"), "", "method(ulmpm, FLIP, linear, 0.99)"),

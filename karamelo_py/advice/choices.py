@@ -75,7 +75,7 @@ CHOICES = (
     ),
     Choice(
         lambda s: s.gas and s.speed > 1 and s.d > 1 and s.diffuses,
-        ("method(ulmpm, APIC, cubic-spline)", "scheme(usavg)"),
+        ("method(ulmpm, TPIC, cubic-spline)", "scheme(usavg)"),
         "a gas that moves faster than its waves, with an artificial heat flux",
         "",
         ("in.noh",),
