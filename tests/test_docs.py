@@ -405,7 +405,8 @@ def _tried(lines, dimension, folder):
             interpreter.run_text(line)
             continue
         if words[2] == "contact" and words[4] != "plane":
-            interpreter = _scene(dimension, folder, "ulmpm/contacts")
+            method = "tlmpm" if words[3] == "solids" else "ulmpm/contacts"
+            interpreter = _scene(dimension, folder, method)
             h = STAGES[dimension][0].split()[-1]
             for solid in words[4:6]:
                 interpreter.run_text(f"solid({solid}, region, disk, 2, steel, {h}, 0)")
