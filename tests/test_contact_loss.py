@@ -32,7 +32,10 @@ run(4)
 def test_a_loss_without_contact_is_told(run_interpreted):
     alone = HIT.replace("method(ulmpm/contacts", "method(ulmpm").replace("fix(f, contact", "#")
     script = alone.format(basis="linear", scheme="musl", law="soft", motion="", more="")
-    assert "contact_loss 'L' stays 0: the scene has no contact" in run_interpreted(script).err
+    assert (
+        "contact_loss 'L': it stays 0, because the scene has no contact"
+        in run_interpreted(script).err
+    )
 
 
 def test_a_loss_of_one_solid_is_told(run_interpreted):
@@ -41,8 +44,14 @@ def test_a_loss_of_one_solid_is_told(run_interpreted):
     text = "\n".join(x for x in script.splitlines() if not any(word in x for word in gone))
     text = text.replace("run(4)", "fix(v, velocity_particles, b, 0.1, 0)\nrun(1)")
     said = run_interpreted(text).err
-    assert "contact_loss 'L' stays 0" in said
-    assert "transfer_loss 'T' stays 0: all points are gas, rigid or soil with pore water" in said
+    assert "contact_loss 'L': it stays 0" in said
+    assert "transfer_loss 'T': it stays 0, because its points are gas, rigid or soil" in said
+
+
+def test_a_loss_of_rigid_points_is_told(run_interpreted):
+    script = HIT.format(basis="linear", scheme="musl", law="steel", motion=LED, more="")
+    said = run_interpreted(script.replace("transfer_loss, all", "transfer_loss, b")).err
+    assert "transfer_loss 'T': it stays 0" in said and "contact_loss" not in said
 
 
 FREE = "fix(b, rigid_body, b, velocity=(0.2, -0.9), spin=0.1)"

@@ -550,6 +550,25 @@ def test_points_that_enter_again_touch_at_once(run_interpreted, tmp_path):
     assert log.f_z[1] < 0 and log.f_z[14] == 0 and log.f_z[15] < 0
 
 
+DEEP = (
+    CUBE.replace("4, 0, 4, 0, 4, 1)", "4, 0, 4, 0, 5, 1)")
+    .replace("1, 3, 1, 3, 0, 1", "1, 3, 1, 3, 1, 1.5")
+    .replace("below, 1, soft", "below, 2, soft")
+    .replace("1.2, 2.8, 1.2, 2.8, 1.2, 2.8", "0.4, 3.6, 0.4, 3.6, 0.9, 4.1")
+    .replace("velocity=(0.1, 0, -1)", "velocity=(0, 0, 0)")
+    .replace("run(30)", "set_dt(0.01)\nrun(1)")
+)
+
+
+def test_points_deeper_than_their_radius_are_pushed_out_of_faces(run_interpreted, tmp_path):
+    """They begin 0.35 of a cell deep, with a radius of 0.25; a block has the shape of the faces."""
+    (tmp_path / "run").mkdir()
+    points, triangles = cube_surface(0.4, 3.6)
+    write(tmp_path / "run" / "cube.stl", points + [0, 0, 0.5], {"triangle": triangles}, binary=True)
+    faces, block = [run_interpreted(DEEP.format(region=r)).log.f_z for r in ("skin", "box")]
+    assert block[1] < 0 and faces[1] == pytest.approx(block[1], rel=1e-5)  # STL: single precision
+
+
 HULL = (
     CUBE.format(region="skin")
     .replace("(0.1, 0, -1)", "(0.1, 0, 0), spin=(0, 0, 2)")

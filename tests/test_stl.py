@@ -315,6 +315,23 @@ def test_other_units_are_named(tmp_path, length, told):
     assert told in "".join(hub.warnings) and bool(told) == bool(hub.warnings)
 
 
+@pytest.mark.parametrize("d", [1, 2, 3])
+@pytest.mark.parametrize("count", [0, 1, 2, 5, 37])
+def test_the_nearest_face_does_not_depend_on_the_known_one(d, count):
+    """The search in the tree, from any face, finds what a search of all faces finds."""
+    rng, kin = np.random.default_rng(count + d), KINEMATICS[d]()
+    corners = rng.random((count, d, d)) if count < 37 else rng.integers(0, 3, (count, d, d)) / 2
+    surface = surfaces.surface_of(corners, 1e-9)
+    assert sorted(surface.faces.tolist()) == sorted(corners.tolist())
+    for reach in (0.2, 2.0):
+        for x in (kin.Vector(*place) for place in rng.random((6, d))):
+            near = [surfaces._squared(kin, surface, i, x) for i in range(count)]
+            best = min([*near, reach * reach])
+            face = near.index(best) if best in near else -1
+            for known in range(-1, count, 6):
+                assert surfaces.closest(kin, surface, x, reach, known) == (best, face)
+
+
 def test_the_way_out_of_a_surface_is_that_to_the_nearest_face():
     """Of a cube, out of its faces and away from its edges; nowhere deeper than it is known."""
     points, triangles = cube_surface(0, 1)

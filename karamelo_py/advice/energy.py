@@ -205,7 +205,7 @@ def words_of_error(hub: Hub, fraction: float, counted: bool) -> str:
         if collides(hub):
             takers.append("collisions")
         by = f"; {' and '.join(takers)} {'dissipates' if len(takers) == 1 else 'dissipate'} energy"
-        if of_transfer in takers and hub.counts_transfer:
+        if of_transfer in takers and any(s.counts_transfer for s in hub.solids.values()):
             by += " (compute transfer_loss measures it)"
     # The sum of losses may exceed the largest energy of the run.
     fraction = round(fraction, 2) + 0.0  # the sum with 0.0 avoids -0.00

@@ -41,7 +41,7 @@ class SceneFacts(BasicFacts):
         parts += [
             (law_part, None) for law_part in (self.method, self.basis, self.transfer, self.scheme)
         ]
-        yield from parts
+        yield from (*parts, *((compute, None) for compute in self.hub.computes.values()))
         owners = [law_part for law_part, _ in parts]
         kinds = declared(owners, "point_fields") + declared(owners, "node_fields")
         yield from ((kind, None) for kind in dict.fromkeys(kinds))

@@ -18,7 +18,7 @@ from karamelo_py.kernels.touching import ASIDE, CALL, direction_of
 from karamelo_py.kernels.views import location_at, state_at, volume_of
 from karamelo_py.points.basis import entry, locate, support
 from karamelo_py.points.bodies import NEW, face, radius
-from karamelo_py.points.grid import node_position
+from karamelo_py.points.grid import node_position, pick
 from karamelo_py.points.kinematics import zero_vector
 from karamelo_py.points.laws.rigid import Rigid
 
@@ -26,6 +26,13 @@ SOFT = 0.1  # fraction of penetration removed per step
 # Columns of `grip`: spring force (3), mean load, unused friction, step of the last touch, position
 # in the body (3).
 GRIP = 9
+ROUNDING = 1e-9  # relative
+# Last search for the surface from a point, in the initial frame of the body
+SEEN = np.dtype([
+    ("at", np.float64, 3),
+    ("within", np.float64),  # depth, at most the reach of the search
+    ("face", np.int64),  # 1 + nearest face, or 0
+])  # fmt: skip
 DEEP = 0.125  # penetration in cells above which the spring hardens, for heavy bodies on few points
 
 _call = caller_of(CALL)
@@ -36,8 +43,7 @@ class TouchingSurface(NamedTuple):
 
     shape: arrays.Tag
     members: np.ndarray  # (N,) bool by id
-    # (N, 2) by id: distance within which there is no face; 1 inside, -1 outside, 0 unknown
-    clear: np.ndarray
+    seen: np.ndarray  # (N,) SEEN by id
     grip: np.ndarray  # (N, GRIP) by id; (0, GRIP) without friction
     mu: float
     limit: float  # largest frictional stress
@@ -53,46 +59,45 @@ def _stencil_of(s, points, p):
     return grid, locate(s.basis, s.kin, grid, location)
 
 
+def _look(seen, x, within, face):
+    for c in range(len(x)):
+        seen.at[c] = x[c]
+    seen.within, seen.face = within, face + 1
+
+
 @point_function(otherwise=True)
-def free_way(shape, kin, x, reach, side):
-    """Return the distance to the surface, up to `reach`, the side and the nearest face.
-
-    The distance is 0 if it cannot save later searches. The side is 1 inside, -1 outside; `side` is
-    the last one if no face has blocked the path since then, else 0.
-    """
-    return 0.0, 0.0, -1
-
-
-@free_way.on(Surface)
-def _free_way_to_faces(shape, kin, x, reach, side):
-    square, face = closest(kin, shape, x, reach)
-    if side == 0.0:
-        side = 1.0 if encloses(kin, shape, x) else -1.0
-    return 0.0 if face < 0 and side > 0 else sqrt(square), side, face
+def touched(shape, kin, x, about, seen):
+    """Return the depth at `x`, and the unit direction out (0 if unknown or the surface is far)."""
+    close, _, h, _ = about
+    within = depth(shape, kin, x, max(close, h))
+    _look(seen, x, within, -1)
+    return _way_out(shape, kin, x, about, within)
 
 
 @noinline
-def _touched(shape, kin, x, about):
-    """Return the depth at `x`, and the unit direction out (0 if unknown or the surface is far)."""
-    close, ball, reach, step = about[:4]
-    within = depth(shape, kin, x, close)
+def _way_out(shape, kin, x, about, within):
+    close, ball, h, _ = about
     if within <= -close:
         return within, x - x
+    reach, step = h + ball, ASIDE * h
     if within > ball:
         within = depth(shape, kin, x, reach)
     return within, direction_of(slopes(shape, kin, x, reach, (within, step)), step)
 
 
-@point_function(otherwise=True)
-def touched(shape, kin, x, about):
-    return _touched(shape, kin, x, about)
-
-
 @touched.on(Surface)
-def _touched_faces(shape, kin, x, about):
-    step, away, side, face = about[3:]
-    if not 0.01 * step < away:
-        return _touched(shape, kin, x, about)
+def _touched_faces(shape, kin, x, about, seen):
+    close, _, h, moved = about
+    side = 1.0 if seen.within > 0 else -1.0
+    if abs(seen.within) <= moved:  # the point may have passed a face
+        side = 1.0 if encloses(kin, shape, x) else -1.0
+    square, face = closest(kin, shape, x, max(close, h), seen.face - 1)
+    away = sqrt(square)
+    _look(seen, x, side * away, face)
+    if side < 0 and away > close:
+        return -away, x - x
+    if face < 0 or not 0.01 * ASIDE * h < away:
+        return _way_out(shape, kin, x, about, side * away)
     # finite differences would take six searches
     return side * away, (-side / away) * (x - place_on(kin, shape, face, x))
 
@@ -112,31 +117,25 @@ def _list_point(body, surface, s, block, p):
     state, constants = body.state[0], body.constants[0]
     times, dt = s.control.step[0], s.control.values[arrays.DT]
     h, none = s.grids.h[0], zero_vector(s.kin, 0.0)
-    x = load_vector(kin, points.x[s.control.motion[0].now], p)
-    # Reject points that cannot reach the surface in this step; nearby searches are cheap.
-    speed = 0.0
-    for c in range(d):
-        speed += abs(points.v[c, p])
-    move, number = 2 * dt * (speed + constants.speed), points.id[p]
-    law, material = state_at(kin, points, block.laws, p)
-    volume = volume_of(kin, points, law, material, p)
-    ball = radius(kin, volume, x)
-    close = min(move, h) + ball
-    if surface.limit < inf:
-        close = max(close, 2 * ball)
-    clear = surface.clear[number]
-    clear[0] -= move
-    if clear[0] > close:
-        return False
+    x, number = load_vector(kin, points.x[s.control.motion[0].now], p), points.id[p]
     arm = [x[c] - state.x[c] if c < d else 0.0 for c in range(3)]
     local = motion.to_start(state, (arm[0], arm[1], arm[2]))
     y = none._make([local[c] + constants.start[c] for c in range(d)])
-    side = clear[1] if clear[0] > move else 0.0  # 0 if the point may have passed the face
-    clear[0], clear[1], nearest = free_way(surface.shape, kin, y, max(close, h), side)
-    if clear[0] > close or (clear[0] > 0 and nearest < 0):
+    seen = surface.seen[number]
+    moved = (1 + ROUNDING) * sqrt((y - none._make([seen.at[c] for c in range(d)])).squared())
+    # Reject points that cannot reach the surface: the depth changes by at most `moved`.
+    speed = 0.0
+    for c in range(d):
+        speed += abs(points.v[c, p])
+    law, material = state_at(kin, points, block.laws, p)
+    volume = volume_of(kin, points, law, material, p)
+    ball = radius(kin, volume, x)
+    close = min(2 * dt * (speed + constants.speed), h) + ball
+    if surface.limit < inf:
+        close = max(close, 2 * ball)
+    if seen.within + moved < -close:
         return False
-    about = close, ball, h + ball, ASIDE * h, clear[0], clear[1], nearest
-    within, way = touched(surface.shape, kin, y, about)
+    within, way = touched(surface.shape, kin, y, (close, ball, h, moved), seen)
     if way.squared() == 0:
         if within > 0 and _call(surface.lost, number) == 0:
             raise RuntimeError("a point has no way out")
@@ -203,17 +202,31 @@ def _retain(grip, control, contact):
     memory[5] = control.values[arrays.TIMESTEP] + 1
 
 
+def _is_near_tile(body, s, tiling, t, square):
+    """Return True if points of tile `t` may be within a distance, given its square, of the body."""
+    if not s.frame.moves:  # tiles are of reference locations
+        return True
+    grid, away, d = record(s.grids, tiling.grid[t]), 0.0, s.kin.dimension
+    for c in range(d):
+        low, at = pick(c, grid.x0, grid.y0, grid.z0), body.state[0].x[c]
+        first, last = [low + tiling.box[t, k] * grid.spacing for k in (c, d + c)]
+        away += max(max(first - at, at - last), 0.0) ** 2
+    return away <= square
+
+
 @noinline
 def _list_points(body, surface, s, block, number):
-    points, x = block.points, block.points.x[s.control.motion[0].now]
+    points, x, tiling = block.points, block.points.x[s.control.motion[0].now], block.tiling
     square = (body.constants[0].bound + 2 * s.grids.h[0]) ** 2
-    for p in range(points.mass.size):
-        near = _is_near(body, s.kin, x, p, square) and surface.members[points.id[p]]
-        if near and _list_point(body, surface, s, block, p):
-            contact = body.contacts[body.count[0]]
-            contact.block, contact.point, contact.slot = number, p, surface.slot
-            contact.torque, contact.area = surface.torque, surface.area
-            body.count[0] += 1
+    for t in range(tiling.count[0]):
+        first, end = tiling.range[t, 0], tiling.range[t, 1]
+        for p in range(first, end if _is_near_tile(body, s, tiling, t, square) else first):
+            near = _is_near(body, s.kin, x, p, square) and surface.members[points.id[p]]
+            if near and _list_point(body, surface, s, block, p):
+                contact = body.contacts[body.count[0]]
+                contact.block, contact.point, contact.slot = number, p, surface.slot
+                contact.torque, contact.area = surface.torque, surface.area
+                body.count[0] += 1
 
 
 @noinline

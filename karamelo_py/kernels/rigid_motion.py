@@ -260,11 +260,16 @@ def set_jacobian(body, x):
         A[k, 3 + i], A[k, 3 + j] = x[j] - centre[j], centre[i] - x[i]
 
 
+def _columns(k):
+    """Return the columns of A that may differ from 0 in row `k`."""
+    return k, 4 if k == 0 else 3, 4 if k == 2 else 5
+
+
 @noinline
 def velocity_there(body, u, k):
     """Return component `k` of A U."""
     v = 0.0
-    for a in range(6):
+    for a in _columns(k):
         v += body.solution.jacobian[k, a] * u[a]
     return v
 
@@ -311,7 +316,7 @@ def residual(body, dt, u, rest, bounded):
     for i in range(body.count[0]):
         _set_impulse(body, u, i, dt, bounded)
         for k in range(3):
-            for a in range(6):
+            for a in _columns(k):
                 total[a] += work.jacobian[k, a] * body.contacts[i].impulse[k]
     for a in range(6):
         rest[a] = total[a] - work.momentum[a]
@@ -338,8 +343,8 @@ def add_slope(body, i, bounded):
                 way = c.slip[k] / c.speed
                 slope -= c.rub * way * c.slip[j] / c.speed
                 slope += 0.0 if bounded else c.lean * stiff * way * c.normal[j]
-            for a in range(A.shape[1]):  # loops compile faster than 36 terms
-                for b in range(A.shape[1]):
+            for a in _columns(k):
+                for b in _columns(j):
                     J[a, b] += slope * A[k, a] * A[j, b]
 
 

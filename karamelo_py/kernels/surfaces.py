@@ -1,7 +1,7 @@
 """Trees of faces: distance to the nearest face, and whether faces enclose a position.
 
-Faces (points in 1D, segments in 2D, triangles in 3D) are leaves of a binary tree of boxes; node k
-has children 2k and 2k + 1, so traversal needs no stack. A position is enclosed if its winding
+Faces (points in 1D, segments in 2D, triangles in 3D) are in the leaves of a binary tree of boxes
+with nodes in depth-first order, so traversal needs no stack. A position is enclosed if its winding
 number is not 0: each face crossed by a ray along the last axis counts 1 or -1. Two faces get
 identical crossings of their common edge, so none is missed or counted twice. (Sunday 2001;
 triangles: Ericson 2005, section 5.1.5.)
@@ -17,16 +17,17 @@ from karamelo_py.compiler import at_hand, noinline, point_function
 from karamelo_py.compiler.threads import Serial, by_threads
 from karamelo_py.points.kinematics import KINEMATICS, dot
 
-LEAF = 4
 CHUNK = 1024  # positions per thread at a time
 TINY = float(np.finfo(float).tiny)
 
 
 class Surface(NamedTuple):
-    """Faces in a tree of boxes, nodes numbered from 1."""
+    """Faces in a tree of n boxes."""
 
-    low: np.ndarray  # (2 l, d) box corners; the last l nodes are leaves
-    high: np.ndarray
+    boxes: np.ndarray  # (n, 2, d) corners
+    # (n, 3) int32: first and end of the faces of a leaf (0, 0 in other nodes); the node after the
+    # subtree
+    nodes: np.ndarray
     faces: np.ndarray  # (m, d, d): face, corner, axis
     odd: bool  # faces are unoriented: inside where a ray crosses an odd number of them
 
@@ -41,36 +42,38 @@ class Convex(NamedTuple):
 
 
 def surface_of(faces: np.ndarray, margin: float, *, odd: bool = False) -> Surface:
-    """Build a tree of `faces` (m, d, d), its boxes enlarged by `margin`; `odd` as in `Surface`."""
+    """Build a tree of `faces` (m, d, d), its boxes enlarged by `margin`; `odd` as in `Surface`.
+
+    A node's faces are halved at the median along its longest axis.
+    """
     count, _, d = faces.shape
-    middle = faces.mean(axis=1)
-    extent = np.maximum(np.ptp(middle, axis=0).max(initial=0), TINY)
-    index = ((middle - middle.min(axis=0, initial=np.inf)) / extent * 1023).astype(np.int64)
-    code = np.zeros(count, np.int64)  # positions along a Morton curve (1966)
-    for bit in range(10):
-        for k in range(d):
-            code |= (index[:, k] >> bit & 1) << (d * bit + k)
-    faces = np.ascontiguousarray(faces[np.argsort(code, kind="stable")], float)
-    leaves = 1 << max(0, (-(-count // LEAF) - 1).bit_length())
-    low, high = np.full((2 * leaves, d), np.inf), np.full((2 * leaves, d), -np.inf)
-    begin = np.arange(0, count, LEAF)
-    used = slice(leaves, leaves + len(begin))
-    low[used] = np.minimum.reduceat(faces.min(axis=1), begin) - margin
-    high[used] = np.maximum.reduceat(faces.max(axis=1), begin) + margin
-    while leaves > 1:
-        below, leaves = slice(leaves, 2 * leaves), leaves // 2
-        low[leaves : 2 * leaves] = low[below].reshape(-1, 2, d).min(axis=1)
-        high[leaves : 2 * leaves] = high[below].reshape(-1, 2, d).max(axis=1)
-    return Surface(low, high, faces, odd)
-
-
-@noinline
-def _behind(k):
-    """Return the node that follows node `k` and its subtree; 0 after the last."""
-    k += 1
-    while k & 1 == 0:
-        k >>= 1
-    return k if k > 1 else 0
+    leaves = 1 << max(count.bit_length() - 1, 0)
+    middle, order, parts = faces.mean(axis=1), np.arange(count), 1
+    while parts < leaves:
+        begin = count * np.arange(parts) // parts
+        part, at = np.repeat(np.arange(parts), np.diff(begin, append=count)), middle[order]
+        size = np.maximum.reduceat(at, begin) - np.minimum.reduceat(at, begin)
+        order = order[np.lexsort((at[np.arange(count), size.argmax(axis=1)[part]], part))]
+        parts *= 2
+    faces = np.ascontiguousarray(faces[order], float)
+    ends = count * np.arange(leaves + 1) // leaves
+    boxes, nodes = np.empty((2 * leaves - 1, 2, d)), np.zeros((2 * leaves - 1, 3), np.int32)
+    levels = [np.stack([np.full((1, d), np.inf), np.full((1, d), -np.inf)], axis=1)]
+    if count:
+        low = np.minimum.reduceat(faces.min(axis=1), ends[:-1]) - margin
+        high = np.maximum.reduceat(faces.max(axis=1), ends[:-1]) + margin
+        levels = [np.stack([low, high], axis=1)]
+    while len(levels[-1]) > 1:
+        low, high = np.moveaxis(levels[-1].reshape(-1, 2, 2, d), 2, 0)
+        levels.append(np.stack([low.min(axis=1), high.max(axis=1)], axis=1))
+    at = np.zeros(1, np.int64)
+    for level in reversed(levels):
+        size = 2 * leaves // len(level) - 1
+        boxes[at], nodes[at, 2] = level, at + size
+        if size == 1:
+            nodes[at, 0], nodes[at, 1] = ends[:-1], ends[1:]
+        at = np.stack([at + 1, at + 1 + size // 2], axis=1).ravel()
+    return Surface(boxes, nodes, faces, odd)
 
 
 def _corner(kin, surface, i, k):
@@ -124,53 +127,57 @@ def _from_triangle(kin, surface, i, x):
     return min(min(_from_line(a, b, x), _from_line(b, c, x)), _from_line(c, a, x))
 
 
-@noinline
 def _from_box(kin, surface, k, x):
     square = 0.0
     for c in range(kin.dimension):
-        away = max(max(surface.low[k, c] - x[c], x[c] - surface.high[k, c]), 0.0)
+        away = max(max(surface.boxes[k, 0, c] - x[c], x[c] - surface.boxes[k, 1, c]), 0.0)
         square += away * away
     return square
 
 
-def _nearer(kin, surface, k, x, nearest):
-    best, face = nearest
-    first = LEAF * (k - surface.low.shape[0] // 2)
-    for i in range(first, min(first + LEAF, surface.faces.shape[0])):
+@noinline
+def _nearer(kin, surface, k, x, found):
+    best, face = found
+    for i in range(surface.nodes[k, 0], surface.nodes[k, 1]):
         square = _squared(kin, surface, i, x)
-        if square < best:
+        if square < best or (square == best and i < face):  # the same face in any order
             best, face = square, i
     return best, face
 
 
 @noinline
-def closest(kin, surface, x, reach):
-    """Return the squared distance to the nearest face within `reach`, and its number, else -1."""
-    leaves = surface.low.shape[0] // 2
-    best, face = reach * reach, -1
-    k = 1
-    while k < leaves:  # descends to a near face first, so that few boxes are searched
-        left, right = _from_box(kin, surface, 2 * k, x), _from_box(kin, surface, 2 * k + 1, x)
-        if min(left, right) >= best:
-            break
-        k = 2 * k if left <= right else 2 * k + 1
-    if k >= leaves:
+def closest(kin, surface, x, reach, known):
+    """Return the squared distance to the nearest face within `reach`, and its number, else -1.
+
+    The search is shorter if `known` is a face nearby; -1 if none is known.
+    """
+    best, face, k = reach * reach, -1, 0
+    if known >= 0:
+        square = _squared(kin, surface, known, x)
+        if square <= best:
+            best, face = square, known
+    if face < 0:
+        # first descend to a near face, so that few boxes are searched
+        while surface.nodes[k, 1] == 0 and k + 1 < surface.nodes.shape[0]:
+            left, right = k + 1, surface.nodes[k + 1, 2]
+            a, b = _from_box(kin, surface, left, x), _from_box(kin, surface, right, x)
+            if min(a, b) > best:
+                break
+            k = left if a <= b else right
         best, face = _nearer(kin, surface, k, x, (best, face))
-    k = 1
-    while k > 0:
-        near = _from_box(kin, surface, k, x) < best
-        if near and k < leaves:
-            k = 2 * k
+    k = 0
+    while k < surface.nodes.shape[0]:
+        if _from_box(kin, surface, k, x) <= best:
+            best, face = _nearer(kin, surface, k, x, (best, face))
+            k += 1
         else:
-            if near:
-                best, face = _nearer(kin, surface, k, x, (best, face))
-            k = _behind(k)
+            k = surface.nodes[k, 2]
     return best, face
 
 
 def distance(surface, kin, x, reach):
     """Return the distance to the nearest face, at most `reach`."""
-    return sqrt(closest(kin, surface, x, reach)[0])
+    return sqrt(closest(kin, surface, x, reach, -1)[0])
 
 
 def _on_line(a, b, x):
@@ -210,7 +217,7 @@ def _place_on_triangle(kin, surface, i, x):
 
 def nearest(kin, surface, x, reach):
     """Return the closest point on the nearest face, which must be within `reach`."""
-    return place_on(kin, surface, closest(kin, surface, x, reach)[1], x)
+    return place_on(kin, surface, closest(kin, surface, x, reach, -1)[1], x)
 
 
 def _offset(surface, kin, x, reach):
@@ -273,22 +280,15 @@ def _crossing_triangle(kin, surface, i, x):
 
 @noinline
 def encloses(kin, surface, x):
-    leaves, count = surface.low.shape[0] // 2, surface.faces.shape[0]
-    last = kin.dimension - 1
-    hits = 0
-    k = 1
-    while k > 0:
-        near = x[last] <= surface.high[k, last]
+    last, hits, k = kin.dimension - 1, 0, 0
+    while k < surface.nodes.shape[0]:
+        near = x[last] <= surface.boxes[k, 1, last]
         for c in range(last):
-            near = near and surface.low[k, c] <= x[c] and x[c] <= surface.high[k, c]
-        if near and k < leaves:
-            k = 2 * k
-        else:
-            if near:
-                first = LEAF * (k - leaves)
-                for i in range(first, min(first + LEAF, count)):
-                    hits += _crossing(kin, surface, i, x)
-            k = _behind(k)
+            near = near and surface.boxes[k, 0, c] <= x[c] and x[c] <= surface.boxes[k, 1, c]
+        if near:
+            for i in range(surface.nodes[k, 0], surface.nodes[k, 1]):
+                hits += _crossing(kin, surface, i, x)
+        k = k + 1 if near else surface.nodes[k, 2]
     return hits & 1 != 0 if surface.odd else hits != 0
 
 
@@ -412,7 +412,7 @@ def _of_positions(measure: Callable) -> Callable[[Surface, np.ndarray, float], n
             out[p] = measure(surface, kin, position, reach)
 
     def measure_all(surface, x, reach):
-        d = surface.low.shape[1]
+        d = surface.faces.shape[2]
         positions, out = np.ascontiguousarray(x[:, :d], float), np.empty(len(x))
         shape = KINEMATICS[d](), surface
         measure_some(Serial(), -(-len(x) // CHUNK), shape, positions, float(reach), out)

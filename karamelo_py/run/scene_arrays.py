@@ -14,7 +14,6 @@ from karamelo_py.kernels.arrays import DT, TIME, TIMESTEP, NoHooks, some_of
 from karamelo_py.kernels.clock import all_well, step_size
 from karamelo_py.kernels.equations.internal_force import Force
 from karamelo_py.kernels.equations.node_updates import SumsToVelocity
-from karamelo_py.kernels.free_bodies import FreeBodies
 from karamelo_py.kernels.heat import SHOW, Conducting
 from karamelo_py.kernels.step import take_rows
 from karamelo_py.kernels.sweep import Extent, Visit, sweep, sweep_nodes
@@ -198,10 +197,6 @@ class SceneArrays:
 
     def changed(self) -> None:
         self.version += 1
-        if isinstance(self.setup.bodies, FreeBodies):  # points may be nearer to surfaces now
-            for body in self.setup.bodies.bodies:
-                for surface in body.surfaces:
-                    surface.clear[:] = 0
 
     @property
     def bounces(self) -> int:

@@ -10,7 +10,6 @@ from typing import Any, NamedTuple, NoReturn
 import numpy as np
 
 from karamelo_py.kernels.equations.move import VelocityBefore
-from karamelo_py.kernels.equations.transfer_loss import TransferLoss
 from karamelo_py.language import registry
 from karamelo_py.language.faults import as_script_error
 from karamelo_py.language.unknown import line_below
@@ -18,7 +17,6 @@ from karamelo_py.output.console import Console
 from karamelo_py.output.fields import Fields
 from karamelo_py.output.record import RunRecord
 from karamelo_py.output.schedule import Output
-from karamelo_py.points.laws import is_rigid
 from karamelo_py.points.transfers import flip_coefficient, stores_moment
 from karamelo_py.scene.comm import SerialComm
 from karamelo_py.scene.domain import Domain, no_domain
@@ -281,12 +279,6 @@ class Hub:
         led = (fix for fix in self.fixes.values() if fix.leads_points and not fix.of_rigid_points)
         leading = self.update.scheme.traits.leading
         return self.update.scheme if leading is None or next(led, None) is None else leading
-
-    @property
-    def counts_transfer(self) -> bool:
-        """Return True if the energy that some points lose in the transfer can be counted."""
-        laws = [solid.material.filled for solid in self.solids.values()]
-        return any(TransferLoss.needed(law) and not is_rigid(law) for law in laws)
 
     @property
     def lattices(self) -> list[Lattice]:

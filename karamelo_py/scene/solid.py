@@ -5,10 +5,18 @@ from collections.abc import Callable, Iterator
 
 import numpy as np
 
+from karamelo_py.kernels.equations.transfer_loss import TransferLoss
 from karamelo_py.language.arguments import Named
 from karamelo_py.language.by_dimension import finite
 from karamelo_py.language.scene import Scene
-from karamelo_py.points.laws import can, constrained_velocity, law_parts, parameter, specific_volume
+from karamelo_py.points.laws import (
+    can,
+    constrained_velocity,
+    is_rigid,
+    law_parts,
+    parameter,
+    specific_volume,
+)
 from karamelo_py.points.laws.doubts import reference_temperatures
 from karamelo_py.points.laws.temperatures import initial_heat
 from karamelo_py.scene.domain import Domain
@@ -49,6 +57,12 @@ class Solid(Named):
     @property
     def rigid(self) -> bool:
         return can(self.material.law, constrained_velocity)
+
+    @property
+    def counts_transfer(self) -> bool:
+        """Return True if the energy that its points lose in the transfer can be counted."""
+        law = self.material.filled
+        return TransferLoss.needed(law) and not is_rigid(law)
 
     def __init__(
         self,

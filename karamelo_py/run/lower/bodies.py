@@ -59,7 +59,7 @@ def _body(hub: Hub, fix: RigidBody, nodes: int) -> motion.FreeBody:
         kernel.TouchingSurface(
             touch.region.outline(),
             touch.group.has(np.arange(count)) & soft,
-            np.zeros((count, 2)),
+            motion.records(kernel.SEEN, count),
             touch.grip_of(count),
             float(touch.mu),
             float(touch.limit),

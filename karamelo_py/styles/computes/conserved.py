@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from karamelo_py.language.rules import Restrictions
+from karamelo_py.language.rules import Restrictions, known_failure
 from karamelo_py.output.point_table import PointTable
 from karamelo_py.output.units import ENERGY, Powers
 from karamelo_py.points.kinematics import total
@@ -143,16 +143,22 @@ class LostByContact(Compute):
             )
 
     def refresh(self) -> None:
-        hub = self.hub
-        touching = [fix for fix in hub.fixes.values() if fix.presses or fix.touches or fix.solids]
-        no_contact = not (touching or (hub.update.method.fields_per_solid and len(hub.solids) > 1))
-        if no_contact and hub.update.first_time("contact loss"):
-            hub.warn(
-                f"compute contact_loss '{self.id}' stays 0: the scene has no contact",
-                mark=self.mark,
-                hint="method(ulmpm/contacts, ...), fix contact/surface or contact/rigid_body",
-            )
-        self.publish_all(hub.fields.lost_by_contact())
+        self.publish_all(self.hub.fields.lost_by_contact())
+
+
+def _has_contact(hub: Hub) -> bool:
+    if hub.update.method.fields_per_solid and len(hub.solids) > 1:
+        return True
+    return any(fix.presses or fix.touches or fix.solids for fix in hub.fixes.values())
+
+
+known_failure(
+    LostByContact,
+    "compute contact_loss '{part.id}'",
+    when=lambda compute, scene: not _has_contact(scene.hub),
+    reason="it stays 0, because the scene has no contact",
+    cure="method(ulmpm/contacts, ...), fix contact/surface or contact/rigid_body",
+)
 
 
 class LostByTransfer(Energy):
@@ -166,10 +172,10 @@ class LostByTransfer(Energy):
     Notes
     -----
     Nodal impulses do work on a point, with the mean of its velocities before and after a step. The
-    loss is this work minus the change of m v^2 / 2. The loss is negative while points get energy
-    back from the moments that they store (APIC): m v^2 / 2 does not include the energy of moments.
-    With usl the loss includes the damping of the scheme. The energy of gases, which take it up as
-    heat, of soil with pore water and of deleted points is not counted.
+    loss is this work minus the change of m v^2 / 2. It is negative while points get energy back
+    from the moments that they store (APIC): m v^2 / 2 does not include the energy of moments. With
+    usl it includes the damping of the scheme. Points of gases, which take this energy up as heat,
+    and of soil with pore water are not counted. The loss of deleted points is counted in group all.
 
     PIC and FLIP below 1 with musl or usavg are always counted. Otherwise this compute makes steps
     10 to 20 % slower.
@@ -183,14 +189,9 @@ class LostByTransfer(Energy):
     measured = "transfer loss"
 
     def refresh(self) -> None:
-        super().refresh()
-        if not self.hub.counts_transfer and self.hub.update.first_time("transfer loss"):
-            self.hub.warn(
-                f"compute transfer_loss '{self.id}' stays 0: all points are gas, rigid or soil "
-                "with pore water, whose loss is not counted",
-                mark=self.mark,
-                hint="remove this compute",
-            )
+        fields = self.hub.fields
+        lost = fields.lost_by_transfer() if self.group.all else None
+        self.publish_all(fields.total(self.measured, self.group) if lost is None else lost)
 
     @property
     def point_fields(self) -> tuple[type, ...]:  # type: ignore[override]
@@ -211,6 +212,22 @@ class LostByTransfer(Energy):
             schemes["scheme"] = "musl", "usavg", "usf", "usl"
         instead = "no compute transfer_loss"
         return Restrictions("transfer_loss", instead, only=schemes, without=("implicit",))
+
+
+def _is_counted(compute: LostByTransfer) -> bool:
+    group = compute.group
+    some = [s for s in compute.hub.solids.values() if group.all or group.touches(s)]
+    return any(solid.counts_transfer for solid in some)
+
+
+known_failure(
+    LostByTransfer,
+    "compute transfer_loss '{part.id}'",
+    when=lambda compute, scene: not _is_counted(compute),
+    reason="it stays 0, because its points are gas, rigid or soil with pore water, whose loss is "
+    "not counted",
+    cure="remove this compute",
+)
 
 
 class Drift:
