@@ -314,6 +314,9 @@ def test_check_says_how_many_steps_the_dry_soil_would_take(run_interpreted):
     assert "volumes of cells" in out
     damped = text.replace("run_time(", "fix(c, local_damping, all)\nrun_time(")
     assert "semi-implicit" not in run_interpreted(damped, command="check").out
+    moves = "-var", "kind", "ulmpm", "-var", "form", "quadratic-spline"
+    out = run_interpreted(text, "-var", "Tv", "1", *moves, command="check").out
+    assert "with scheme(semi-implicit), limited by the dry soil, about 1540 steps" in out
 
 
 def test_a_modified_skeleton_keeps_its_water(run_interpreted):

@@ -128,8 +128,8 @@ def words_of_fraction(simulation: Simulation) -> str:
 
 def words_of_solution(simulation: Simulation, duration: float) -> str:
     """Return how many steps semi-implicit would take, or "" if it does not support the scene."""
-    hub, method = simulation.hub, simulation.hub.update.method
-    fits = method.basis_name == "linear" and not method.frame.moves and is_wet(hub)
+    hub = simulation.hub
+    fits = is_wet(hub) and not hub.domain.periodic
     traits = hub.update.scheme.traits
     explicit = not traits.implicit and not traits.solves_pressure
     alone = hub.settings.engine == "processor" and hub.settings.comm.size == 1

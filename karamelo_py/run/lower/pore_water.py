@@ -6,7 +6,6 @@ import numpy as np
 
 from karamelo_py.kernels import pore_water as rows
 from karamelo_py.language.rules import FLAT, HATS_AND_SPLINES, Restrictions
-from karamelo_py.points.basis.linear import Linear
 from karamelo_py.points.kinematics import Space
 from karamelo_py.points.laws import initial_state, specific_volume, wave_speed_squared
 from karamelo_py.points.laws.pore_water import ConstantPermeability, KozenyCarman, Saturated
@@ -42,7 +41,7 @@ class PoreWater(NamedTuple):
     @property
     def point_fields(self) -> tuple[type, ...]:
         method = self.update.method
-        linear = method is not None and isinstance(method.basis, Linear)
+        linear = method is not None and method.basis.traits.gradient_jumps
         return rows.Water.point_fields[: 2 if linear else None]
 
     @property
