@@ -4,7 +4,8 @@ from math import inf
 
 from karamelo_py.kernels.clock import STILL, STRIDE
 from karamelo_py.language import registry
-from karamelo_py.run.lower.solved_pressure import is_wet, unsupported
+from karamelo_py.run.lower.hooks import is_wet
+from karamelo_py.run.lower.solved_pressure import unsupported
 from karamelo_py.run.simulation import Simulation
 from karamelo_py.run.stable_step import (
     conserving_fraction,

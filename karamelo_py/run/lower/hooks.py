@@ -17,7 +17,6 @@ from karamelo_py.kernels.totals import LIMBS
 from karamelo_py.kernels.walls import FRICTION
 from karamelo_py.language.faults import as_script_error
 from karamelo_py.run.boxes import unique
-from karamelo_py.run.lower.solved_pressure import is_wet
 from karamelo_py.run.state import SceneState
 from karamelo_py.scene.hub import Hub
 from karamelo_py.scene.modify import Fix, moved
@@ -76,6 +75,10 @@ def compiled_hooks(fixes: list) -> list[tuple[Fix, str, CompiledHook]]:
         for name, hook in fix.hooks().items()
         if isinstance(hook, CompiledHook)
     ]
+
+
+def is_wet(hub: Hub) -> bool:
+    return any(solid.material.fluid is not None for solid in hub.solids.values())
 
 
 class Programs:

@@ -3,6 +3,7 @@
 from collections.abc import Iterator
 
 from karamelo_py.language import registry
+from karamelo_py.run.lower.hooks import is_wet
 from karamelo_py.scene.hub import Hub
 from karamelo_py.script.errors import ScriptError
 
@@ -22,10 +23,6 @@ def check(hub: Hub) -> None:
     for error in errors:
         error.others = errors[1:]
         raise error
-
-
-def is_wet(hub: Hub) -> bool:
-    return any(solid.material.fluid is not None for solid in hub.solids.values())
 
 
 def unsupported(hub: Hub, name: str) -> Iterator[ScriptError]:
