@@ -365,6 +365,20 @@ def test_friction_with_a_limit_acts_on_the_whole_area(run_interpreted, d, ppc):
     assert log.f_y[1:].mean() > 0.5 * 2 ** (d - 1)
 
 
+def test_friction_has_its_limit_in_the_first_step_of_contact(run_interpreted):
+    """Points that come to the surface within a step press before they overlap it."""
+    falls = "group(g, particles, region, block, solid, block)\nset_dt(0.017)\nset_output(1)\n"
+    falls += "fix(fall, initial_velocity_particles, g, 0, -5)\nlog_modify"
+    text = DRAGGED.format(
+        d=2, ppc=2, box="0, 6, 0, 6", plate="block, 1, 5, 1, 2", block="block, 2, 4, 3, 4",
+        motion="0.5, 0", turning="0", weight=", 0, 0",
+    ).replace("log_modify", falls).replace("run(9)", "run(12)")  # fmt: skip
+    log = run_interpreted(text).log
+    assert log.f_x[-2] == 0
+    assert log.f_y[-1] > 5
+    assert log.f_x[-1] == pytest.approx(0.1 * 2, rel=1e-6)
+
+
 @pytest.mark.parametrize(("method", "touch"), [("ulmpm/contacts", GRID), ("tlmpm", POINTS)])
 def test_a_restarted_run_has_the_same_bits(run_interpreted, method, touch):
     text = HIT.format(method=method, touch=touch, ratio=1).replace("run(20)", "run(10)")

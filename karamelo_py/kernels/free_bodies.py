@@ -240,9 +240,9 @@ def _limit_friction(body, surface, kick, first):
         contact = body.contacts[i]
         layer += contact.face if contact.gap < contact.reach else 0.0
         pressed += contact.face if contact.gap < 0 else 0.0
-    for i in range(first, body.count[0] if pressed > 0 else first):
-        contact = body.contacts[i]
-        contact.limit = kick * surface.limit * contact.face * layer / pressed
+    most = kick * surface.limit * (layer / pressed if pressed > 0 else 1.0)
+    for i in range(first, body.count[0]):
+        body.contacts[i].limit = most * body.contacts[i].face
 
 
 @noinline

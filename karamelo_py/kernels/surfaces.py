@@ -154,7 +154,7 @@ def closest(kin, surface, x, reach, known):
     best, face, k = reach * reach, -1, 0
     if known >= 0:
         square = _squared(kin, surface, known, x)
-        if square <= best:
+        if square < best:
             best, face = square, known
     if face < 0:
         # first descend to a near face, so that few boxes are searched

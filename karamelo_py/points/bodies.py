@@ -102,19 +102,19 @@ def _force_between_minimize_penetration(law, kin, pair):
 @force_between.on(MeetingFaces)
 def _force_between_faces(law, kin, pair):
     (face1, face2), (mass1, mass2) = pair.faces, pair.masses
-    facing = dot(face1.normal, face2.normal) < 0
-    # An edge touches a flat face along the normal of the face.
-    normal = max(face1.flat, 1 - face2.flat) * face1.normal
-    normal = normal - max(face2.flat, 1 - face1.flat) * face2.normal
+    # A point next to an edge is a ball inside the body, so symmetric bodies meet symmetrically.
+    edge1, edge2 = 1 - face1.flat, 1 - face2.flat
+    n1, n2 = face1.flat * face1.normal, face2.flat * face2.normal
+    facing = edge1 + edge2 > 0 or dot(n1, n2) < 0
+    normal = n1 - n2 + edge1 * edge2 / pair.r * pair.dx
     normal = 1 / sqrt(normal.squared() if facing else 1.0) * normal
-    apart = dot(pair.dx, normal)
+    apart, narrow = dot(pair.dx, normal), min(face1.wide, face2.wide)
     aside = sqrt(max(pair.r * pair.r - apart * apart, 0.0))
-    near1, near2 = face1.near * dot(face1.normal, normal), face2.near * dot(face2.normal, normal)
-    p, narrow = near1 - near2 - apart, min(face1.wide, face2.wide)
+    p = face1.near * (edge1 + dot(n1, normal)) + face2.near * (edge2 - dot(n2, normal)) - apart
     common = min(0.5 * (face1.wide + face2.wide) - aside, narrow)
     touching = facing and 0 < p < narrow and common > 0
     # The widths of a body's faces add up to its surface, so the forces on a face do not depend on
-    # how its points are opposite the points of the other body.
+    # how its points are opposite the points of the other body (in 3D they vary by up to 17 %).
     reduced = mass1 * mass2 / (mass1 + mass2) * common / (narrow if narrow > 0 else 1.0)
     stiffness = reduced / (pair.dt * pair.kick) if touching else 0.0
     return -stiffness * p * normal, stiffness

@@ -50,7 +50,7 @@ class ContactSolids(PairContact):
 
     Surfaces are smooth, also if they are inclined to the grid: friction on slopes of 10 to 33
     degrees is correct within 1.5 %. A disk of 4 and 8 cells in its radius rolls down a plane 5 and
-    1 to 2 % too slowly. Edges are blunt: a point next to an edge has a face on one side only.
+    1 to 2 % too slowly. Edges are rounded: points next to an edge are balls.
 
     See Also
     --------
