@@ -302,6 +302,16 @@ def test_check_says_whether_water_flows_in_time(run_interpreted, Tv, word):
     assert "flux of the water; inflow and outflow of water" in out
 
 
+def test_a_loaded_surface_without_a_drain_needs_a_linear_basis(run_interpreted):
+    """The smoothing of volume strains lets it sink with splines: the energy balance says so."""
+    load = "fix(load, force_nodes, top, -1e4)\nrun(130)"
+    splines = (COLUMN + load).replace("tlmpm, FLIP, linear", "ulmpm, FLIP, quadratic-spline")
+    err = run_interpreted(splines, "-var", "N", "4").err
+    assert "a load on a surface without fix pore_pressure" in err
+    assert "fix: scheme(semi-implicit), or linear" in err
+    assert "energy balance" not in run_interpreted(COLUMN + load, "-var", "N", "4").err
+
+
 @same_kernels
 def test_check_says_how_many_steps_the_dry_soil_would_take(run_interpreted):
     """As many as the scheme takes: 0.9 x 0.9 h/c with c^2 = 1e7/1590."""

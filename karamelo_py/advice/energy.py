@@ -10,6 +10,7 @@ from karamelo_py.points.transfers import flip_coefficient
 from karamelo_py.run import stable_step
 from karamelo_py.run.energy import GROWING
 from karamelo_py.run.listening import Trouble, when
+from karamelo_py.run.lower.hooks import is_wet
 from karamelo_py.run.simulation import Simulation
 from karamelo_py.scene.hub import Hub
 
@@ -143,6 +144,12 @@ def cause_of_loss(hub: Hub) -> tuple[str, str]:
     if update.scheme.traits.damps:
         name = registry.name_of("scheme", type(update.scheme))
         return f"scheme {name} damps vibrations", "scheme(musl)"
+    if is_wet(hub) and not (update.scheme.traits.implicit or method.basis.traits.gradient_jumps):
+        return (
+            f"pore water and a {method.basis_name} basis in explicit steps: a load on a surface "
+            "without fix pore_pressure",
+            "scheme(semi-implicit), or linear; or fix pore_pressure where water leaves",
+        )
     if collision := collides(hub):
         return collision
     if method.frame.moves and method.basis.traits.gradient_jumps:
