@@ -308,7 +308,7 @@ def test_a_loaded_surface_without_a_drain_needs_a_linear_basis(run_interpreted):
     splines = (COLUMN + load).replace("tlmpm, FLIP, linear", "ulmpm, FLIP, quadratic-spline")
     err = run_interpreted(splines, "-var", "N", "4").err
     assert "a load on a surface without fix pore_pressure" in err
-    assert "fix: scheme(semi-implicit), or linear" in err
+    assert "fix: linear, or scheme(semi-implicit)" in err
     assert "energy balance" not in run_interpreted(COLUMN + load, "-var", "N", "4").err
 
 

@@ -148,7 +148,7 @@ def cause_of_loss(hub: Hub) -> tuple[str, str]:
         return (
             f"pore water and a {method.basis_name} basis in explicit steps: a load on a surface "
             "without fix pore_pressure",
-            "scheme(semi-implicit), or linear; or fix pore_pressure where water leaves",
+            "linear, or scheme(semi-implicit); or fix pore_pressure where water leaves",
         )
     if collision := collides(hub):
         return collision
