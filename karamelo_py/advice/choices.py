@@ -74,6 +74,20 @@ CHOICES = (
         ("in.static_collapse",),
     ),
     Choice(
+        lambda s: s.wet and s.elastic_only and s.alone,
+        ("method(tlmpm, FLIP, linear, 1)",),
+        "elastic soil with pore water",
+        "points stay in their cells, and loaded surfaces without a drain do not sink",
+        ("in.terzaghi",),
+    ),
+    Choice(
+        lambda s: s.wet,
+        ("method(ulmpm, FLIP, quadratic-spline, 0.999)",),
+        "soil with pore water that flows, or that other bodies touch",
+        "effective pressures have little noise, and FLIP 0.99 shortens run-outs by 30 %",
+        ("in.wet_column",),
+    ),
+    Choice(
         lambda s: s.gas and s.speed > 1 and s.d > 1 and s.diffuses,
         ("method(ulmpm, TPIC, cubic-spline)", "scheme(usavg)"),
         "a gas that moves faster than its waves, with an artificial heat flux",

@@ -103,6 +103,7 @@ class Scouted(SceneFacts):
         )
     )
     elastic_only = property(lambda s: not any(map(yields, s.laws)))
+    wet = property(lambda s: any(solid.material.fluid for solid in s.soft))
     gas = property(lambda s: any(can(law, taken_heat) for law in s.laws))
     grains = property(lambda s: any(MuI in law_kind(law) for law in s.laws))
 
