@@ -33,7 +33,7 @@ def test_a_loss_without_contact_is_told(run_interpreted):
     alone = HIT.replace("method(ulmpm/contacts", "method(ulmpm").replace("fix(f, contact", "#")
     script = alone.format(basis="linear", scheme="musl", law="soft", motion="", more="")
     assert (
-        "contact_loss 'L': it stays 0, because the scene has no contact"
+        "contact_loss 'L': it stays 0, because the scene has no contact at nodes or surfaces"
         in run_interpreted(script).err
     )
 

@@ -122,7 +122,7 @@ class LostByContact(Compute):
     tangential impulse times the mean sliding velocity. The sum is the work done by free rigid
     bodies and by bodies that contact does not move, minus the work done on points. The sum is exact
     with FLIP 1 in musl and usavg. Damping and friction of contact/surface and contact/rigid_body
-    are included, load steps are not. The group must be all points.
+    are included; contact between points and load steps are not. The group must be all points.
 
     See Also
     --------
@@ -149,14 +149,14 @@ class LostByContact(Compute):
 def _has_contact(hub: Hub) -> bool:
     if hub.update.method.fields_per_solid and len(hub.solids) > 1:
         return True
-    return any(fix.presses or fix.touches or fix.solids for fix in hub.fixes.values())
+    return any(fix.presses or fix.touches for fix in hub.fixes.values())
 
 
 known_failure(
     LostByContact,
     "compute contact_loss '{part.id}'",
     when=lambda compute, scene: not _has_contact(scene.hub),
-    reason="it stays 0, because the scene has no contact",
+    reason="it stays 0, because the scene has no contact at nodes or surfaces",
     cure="method(ulmpm/contacts, ...), fix contact/surface or contact/rigid_body",
 )
 
