@@ -369,7 +369,7 @@ class ContactFriction(Fix):
                 "contact/friction needs a velocity field per solid",
                 expected="method(ulmpm/contacts, ...)",
                 hint="in ulmpm solids that meet on the grid stick together; "
-                "for tlmpm there is fix contact/minimize_penetration",
+                "for tlmpm there is fix contact/solids",
             )
         a, b = (method.lattice_of(hub, solid) for solid in (solid1, solid2))
         if a == b:
