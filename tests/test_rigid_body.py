@@ -365,6 +365,30 @@ def test_friction_with_a_limit_acts_on_the_whole_area(run_interpreted, d, ppc):
     assert log.f_y[1:].mean() > 0.5 * 2 ** (d - 1)
 
 
+def test_a_limit_of_friction_without_friction_is_refused(run_interpreted):
+    script = INSIDE_OUT + "fix(t, contact/rigid_body, all, bar, limit=1)\nrun(1)"
+    assert "needs a coefficient of friction mu" in run_interpreted(script, status=1).err
+
+
+INSIDE_OUT = """
+    method(tlmpm, FLIP, linear, 1)
+    dimension(2, 0, 1, 0, 1, 0.1)
+    anti_volumetric_locking(true)
+    region(a, block, 0.2, 0.5, 0.2, 0.5)
+    region(c, block, 0.6, 0.8, 0.6, 0.8)
+    material(m, neo-hookean, 1000, 1e5, 0.3)
+    material(steel, rigid, 1600)
+    solid(a, region, a, 2, m, 0.1)
+    solid(bar, region, c, 2, steel, 0.1)
+    fix(b, rigid_body, bar, motion=(0, -1), turning=0)
+"""
+
+
+def test_averaged_volumes_leave_rigid_bodies_alone(run_interpreted):
+    """The averaged volume change of rigid points was 0, so they turned inside out."""
+    run_interpreted(INSIDE_OUT + "run(3)")
+
+
 def test_friction_has_its_limit_in_the_first_step_of_contact(run_interpreted):
     """Points that come to the surface within a step press before they overlap it."""
     falls = "group(g, particles, region, block, solid, block)\nset_dt(0.017)\nset_output(1)\n"

@@ -16,6 +16,11 @@ from karamelo_py.scene.hub import Hub
 
 LOSS = 0.05  # lost fraction for a warning at the end of a run; WITHIN: before the end
 LEAST = 5e-4  # fraction of the largest energy below which losses by contact are not shown
+WATER = (
+    "pore water and splines in explicit steps, above all at loaded surfaces without fix "
+    "pore_pressure",
+    "linear, or scheme(semi-implicit)",
+)
 WHOLE = "more points per cell, a finer grid, cpgimp or ulcpdi, or method tlmpm"
 
 
@@ -52,6 +57,8 @@ def cause_of_gain(hub: Hub, simulation: Simulation) -> tuple[str, str]:
             f"undeformed state ({stable:.4g})",
             f"set_dt({stable_step.DEFAULT_FRACTION * stable:.3g}) or less, or remove set_dt",
         )
+    if smooths_water(hub):
+        return WATER
     if moves and jumps and update.transfer.traits.inverts_spread:
         return f"{transfer} with {basis} in the updated frame", f"FLIP, or {smooth}"
     gradients = SceneFacts(hub, simulation, simulation.time).moments
@@ -139,17 +146,19 @@ def words_of_loss(hub: Hub, simulation: Simulation) -> Trouble | None:
     return Trouble(message, fix, "energy-loss", cause)
 
 
+def smooths_water(hub: Hub) -> bool:
+    traits = hub.update.scheme.traits
+    explicit = not (traits.implicit or traits.solves_pressure)
+    return is_wet(hub) and explicit and not hub.update.method.basis.traits.gradient_jumps
+
+
 def cause_of_loss(hub: Hub) -> tuple[str, str]:
     update, method = hub.update, hub.update.method
     if update.scheme.traits.damps:
         name = registry.name_of("scheme", type(update.scheme))
         return f"scheme {name} damps vibrations", "scheme(musl)"
-    if is_wet(hub) and not (update.scheme.traits.implicit or method.basis.traits.gradient_jumps):
-        return (
-            f"pore water and a {method.basis_name} basis in explicit steps: a load on a surface "
-            "without fix pore_pressure",
-            "linear, or scheme(semi-implicit); or fix pore_pressure where water leaves",
-        )
+    if smooths_water(hub):
+        return WATER
     if collision := collides(hub):
         return collision
     if method.frame.moves and method.basis.traits.gradient_jumps:

@@ -85,8 +85,9 @@ def pore_water(
 
     Use this command before the first solid of the material. It needs method ulmpm or tlmpm with
     FLIP or PIC and linear, quadratic-spline or cubic-spline, scheme musl, semi-implicit or
-    quasi-static, and a scene in 1D, plane strain or 3D (with semi-implicit also axisymmetric or
-    cylindrical). With ulmpm and linear, results lose accuracy at strains above 10 %.
+    quasi-static, and a scene in 1D, plane strain or 3D (with semi-implicit and linear also
+    axisymmetric or cylindrical). With ulmpm and linear, results lose accuracy at strains above 10
+    %.
 
     See Also
     --------

@@ -35,10 +35,11 @@ class SemiImplicit(NamedTuple):
 
     Notes
     -----
-    The scheme needs a material with pore_water; scenes are in 1D, plane strain, 3D, axisymmetric or
-    cylindrical. Nodes of fix seepage_face remain open or closed for a step, by the pressure at its
-    beginning. Not supported: bounds and friction in velocity_nodes; fixes local_damping, absorbing
-    and ground_motion; velocity_particles on soil; ``--ranks`` and ``--gpu``.
+    The scheme needs a material with pore_water; scenes are in 1D, plane strain or 3D, with linear
+    also axisymmetric or cylindrical. Nodes of fix seepage_face remain open or closed for a step, by
+    the pressure at its beginning. Not supported: bounds and friction in velocity_nodes; fixes
+    local_damping, absorbing and ground_motion; velocity_particles on soil; ``--ranks`` and
+    ``--gpu``.
 
     See Also
     --------

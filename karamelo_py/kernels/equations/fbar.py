@@ -149,7 +149,7 @@ def gathered_ratio(node, total):
 
 def averaged(pt, dl, ratio):
     """Scale `dl` to the averaged volume change; in the total frame, scale F + dl."""
-    if not len(ratio):
+    if not len(ratio) or laws.is_rigid(pt.w.laws):
         return dl
     _, _, f = pt.law_state_F
     trial = pt.of(VolumeRatio)[0, pt.p]

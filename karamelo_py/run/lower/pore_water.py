@@ -20,7 +20,8 @@ RESTRICTIONS = Restrictions(
           "basis": HATS_AND_SPLINES, "scheme": ("musl", "semi-implicit", "quasi-static"),
           "kinematics": FLAT},
     without=("heat", "delete", "reflect", "thin"),
-    but={"kinematics": "1D, plane strain or 3D; axisymmetric or cylindrical with semi-implicit",
+    but={"kinematics": "1D, plane strain or 3D; axisymmetric or cylindrical with semi-implicit "
+         "and linear",
          "single": "precision(double): water is stiff",
          "F-bar": "no anti_volumetric_locking: the pressure of the water does not lock"},
 )  # fmt: skip
@@ -40,9 +41,12 @@ class PoreWater(NamedTuple):
 
     @property
     def point_fields(self) -> tuple[type, ...]:
+        return rows.Water.point_fields[: 2 if self._is_linear else None]
+
+    @property
+    def _is_linear(self) -> bool:
         method = self.update.method
-        linear = method is not None and method.basis.traits.gradient_jumps
-        return rows.Water.point_fields[: 2 if linear else None]
+        return method is not None and method.basis.traits.gradient_jumps
 
     @property
     def words(self) -> str:
@@ -53,7 +57,7 @@ class PoreWater(NamedTuple):
         only = dict(RESTRICTIONS.only)
         if self.suction < self.K:
             only["scheme"] = ("quasi-static",)
-        elif self.update.scheme.traits.solves_pressure:
+        elif self.update.scheme.traits.solves_pressure and self._is_linear:
             only["kinematics"] = *FLAT, "axisymmetric", "cylindrical"
         return RESTRICTIONS._replace(only=only)
 

@@ -496,6 +496,9 @@ class ContactRigidBody(Fix):
         super().__init__(hub, group)
         judge_friction(hub, mu)
         self.mu, self.touches, surface = mu, solid, region or solid.region
+        if limit is not None and not mu > 0:
+            message = "a limit of friction needs a coefficient of friction mu"
+            raise ScriptError(message, argument="limit", expected=f"mu=1, limit={limit:g}")
         self.limit = inf if limit is None else limit
         self.grip = np.zeros((0, GRIP))
         if group.touches(solid) and not group.all:
