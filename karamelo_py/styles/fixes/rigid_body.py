@@ -441,7 +441,7 @@ class ContactRigidBody(Fix):
     solid
         ID of the rigid solid, which must have a fix rigid_body.
     mu
-        Coefficient of friction (Coulomb).
+        Coefficient of friction (Coulomb); default: 0.
     limit
         Largest frictional stress, such as the strength of clay on a rough surface; default: none.
     region
@@ -488,15 +488,15 @@ class ContactRigidBody(Fix):
         hub: Hub,
         group: ParticleGroup,
         solid: Solid,
-        mu: Annotated[float, NonNegative] = 0.0,
+        mu: Annotated[float, NonNegative] | None = None,
         *,
         limit: Annotated[float, Positive] | None = None,
         region: Region | None = None,
     ):
         super().__init__(hub, group)
-        judge_friction(hub, mu)
-        self.mu, self.touches, surface = mu, solid, region or solid.region
-        if limit is not None and not mu > 0:
+        judge_friction(hub, mu or 0.0)
+        self.mu, self.touches, surface = mu or 0.0, solid, region or solid.region
+        if limit is not None and mu is None:
             message = "a limit of friction needs a coefficient of friction mu"
             raise ScriptError(message, argument="limit", expected=f"mu=1, limit={limit:g}")
         self.limit = inf if limit is None else limit
