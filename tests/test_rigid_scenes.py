@@ -339,3 +339,11 @@ def test_an_elastic_ball_rebounds(run_script, method, touch):
     log = run_script(REBOUND.format(method=method, touch=touch)).log
     restitution = -log.p_y[-1] / log.p_y[0]
     assert 0.93 < restitution < 1 and log.b_vy[-1] < 0
+
+
+def test_contact_in_threads_has_the_same_bits(run_script):
+    text = REBOUND.format(method="ulmpm", touch="fix(t, contact/rigid_body, all, base)")
+    text = text.replace("1.1, 4*h", "0.99, 4*h").replace("p_y, b_vy", "p_y, b_vy, t_y, t_area")
+    text = text.replace("run_time(0.8)", "run(20)").replace("output(1000)", "output(1)")
+    one, two = [run_script(text, "--threads", n, folder=n).log for n in "12"]
+    assert one.t_y[-1] > 0 and all((one[name] == two[name]).all() for name in one)

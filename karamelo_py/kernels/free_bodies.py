@@ -7,12 +7,13 @@ import numpy as np
 
 from karamelo_py.compiler import caller_of, kernel, noinline, point_function
 from karamelo_py.compiler.fields import load_vector
+from karamelo_py.compiler.threads import shared_out
 from karamelo_py.compiler.tuples import record
 from karamelo_py.kernels import arrays, rigid_links
 from karamelo_py.kernels import rigid_motion as motion
 from karamelo_py.kernels.contact import Bodies, SeparateFields, closing_part, list_pairs
 from karamelo_py.kernels.surfaces import Surface, closest, depth, encloses, place_on, slopes
-from karamelo_py.kernels.table import AtNodes, Once, each_node, each_point
+from karamelo_py.kernels.table import AtNodes, InThreads, Once, each_node, each_point
 from karamelo_py.kernels.totals import CONTACT_LOSS, WORK, add_to
 from karamelo_py.kernels.touching import ASIDE, CALL, direction_of
 from karamelo_py.kernels.views import location_at, state_at, volume_of
@@ -27,6 +28,7 @@ SOFT = 0.1  # fraction of penetration removed per step
 # in the body (3).
 GRIP = 9
 ROUNDING = 1e-9  # relative
+END = -1  # number of no point, after the last contact of a tile
 # Last search for the surface from a point, in the initial frame of the body
 SEEN = np.dtype([
     ("at", np.float64, 3),
@@ -111,9 +113,9 @@ def _is_near(body, kin, x, p, square):
 
 
 @noinline
-def _list_point(body, surface, s, block, p):
-    """Record a contact of point `p` with a surface; return True if it touches."""
-    kin, points, d = s.kin, block.points, s.kin.dimension
+def _list_point(body, surface, s, block, contact):
+    """Record a contact of a point with a surface; return True if it touches."""
+    kin, points, d, p = s.kin, block.points, s.kin.dimension, contact.point
     state, constants = body.state[0], body.constants[0]
     times, dt = s.control.step[0], s.control.values[arrays.DT]
     h, none = s.grids.h[0], zero_vector(s.kin, 0.0)
@@ -142,7 +144,6 @@ def _list_point(body, surface, s, block, p):
         return False
     out = [way[c] if c < d else 0.0 for c in range(3)]
     normal = motion.from_start(state, (out[0], out[1], out[2]))
-    contact = body.contacts[body.count[0]]
     for c in range(3):
         contact.normal[c], contact.v[c] = normal[c], 0.0
         contact.at[c] = arm[c] + state.x[c]
@@ -214,19 +215,35 @@ def _is_near_tile(body, s, tiling, t, square):
     return away <= square
 
 
-@noinline
-def _list_points(body, surface, s, block, number):
+@shared_out
+def _list_tile(body, surface, s, block, t):
+    """List contacts of a tile's points, the first one at the tile's first point."""
     points, x, tiling = block.points, block.points.x[s.control.motion[0].now], block.tiling
     square = (body.constants[0].bound + 2 * s.grids.h[0]) ** 2
-    for t in range(tiling.count[0]):
-        first, end = tiling.range[t, 0], tiling.range[t, 1]
-        for p in range(first, end if _is_near_tile(body, s, tiling, t, square) else first):
-            near = _is_near(body, s.kin, x, p, square) and surface.members[points.id[p]]
-            if near and _list_point(body, surface, s, block, p):
-                contact = body.contacts[body.count[0]]
-                contact.block, contact.point, contact.slot = number, p, surface.slot
-                contact.torque, contact.area = surface.torque, surface.area
-                body.count[0] += 1
+    first, end = tiling.range[t, 0], tiling.range[t, 1]
+    found = body.count[0] + first
+    for p in range(first, end if _is_near_tile(body, s, tiling, t, square) else first):
+        contact = body.contacts[found]
+        contact.point = p
+        if _is_near(body, s.kin, x, p, square) and surface.members[points.id[p]]:
+            found += 1 if _list_point(body, surface, s, block, contact) else 0
+    if found < body.count[0] + end:
+        body.contacts[found].point = END
+
+
+@noinline
+def _list_points(body, surface, s, block, mode):
+    first, tiles, points_of = body.count[0], block.tiling.count[0], block.tiling.range
+    _list_tile(mode, tiles, body, surface, s, block)
+    for t in range(tiles):
+        for q in range(first + points_of[t, 0], first + points_of[t, 1]):
+            if body.contacts[q].point == END:
+                break
+            body.words[body.count[0]] = body.words[q]
+            contact = body.contacts[body.count[0]]
+            contact.slot, contact.torque = surface.slot, surface.torque
+            contact.area = surface.area
+            body.count[0] += 1
 
 
 @noinline
@@ -389,7 +406,7 @@ def _follow(s, n, again):
 
 
 @noinline
-def _list_contacts(body, s):
+def _list_contacts(body, s, mode):
     body.count[0] = 0
     for surface in body.surfaces:
         s.control.values[surface.area] = 0.0
@@ -399,7 +416,10 @@ def _list_contacts(body, s):
             s.control.values[surface.torque + c] = 0.0
         first = body.count[0]
         for number, block in enumerate(s.blocks):
-            _list_points(body, surface, s, block, number)
+            begin = body.count[0]
+            _list_points(body, surface, s, block, mode)
+            for i in range(begin, body.count[0]):
+                body.contacts[i].block = number
         _limit_friction(body, surface, s.control.step[0].kick, first)
     if isinstance(s.contact, SeparateFields):
         _lead_nodes(body, s)
@@ -416,21 +436,21 @@ def _push(body, s):
 
 
 @kernel
-def _meet(s):
+def _meet(s, mode):
     bodies, links = s.bodies.bodies, s.bodies.links
     if isinstance(links, rigid_links.Links):
         for body in bodies:
             motion.start_step(body, s.control)
         if rigid_links.find(links, bodies, s.control, s.kin):
             for body in bodies:
-                _list_contacts(body, s)
+                _list_contacts(body, s, mode)
             rigid_links.solve(links, bodies, s.control)
             for body in bodies:
                 _push(body, s)
             return
     for body in bodies:
         motion.start_step(body, s.control)
-        _list_contacts(body, s)
+        _list_contacts(body, s, mode)
         motion.solve(body, s.control.values[arrays.DT])
         _push(body, s)
 
@@ -489,7 +509,7 @@ class FreeBodies(NamedTuple):
     held: np.ndarray  # (N, d) 1 + slot of the reaction where v is prescribed, else 0
     torques: np.ndarray  # (values,) slot of the torque of a force's slot, or 0
     links: rigid_links.NoLinks | rigid_links.Links
-    rows_first = (Once(_meet),)
+    rows_first = (InThreads(_meet),)
     rows_last = Once(_part), each_point(_lead_point, Rigid)
     rows_before = (each_node(lambda s, n: _follow(s, n, False)),)
     rows_after = (each_node(lambda s, n: _follow(s, n, True)),)

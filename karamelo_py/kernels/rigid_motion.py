@@ -111,6 +111,7 @@ class FreeBody(NamedTuple):
     formulas: Formulas
     solution: Solution
     contacts: np.ndarray  # (n,) CONTACT
+    words: np.ndarray  # (n, w) int64, view of the contacts
     count: np.ndarray  # (1,) int64
     pairs: ListedPairs  # scratch of contact at nodes
     surfaces: tuple  # `kernels.free_bodies.TouchingSurface`

@@ -98,6 +98,11 @@ def _once(row, s, step):
     return row.function(s)
 
 
+@take.on(table.InThreads, Processor)
+def _in_threads(row, s, step):
+    return row.function(s, step.mode)
+
+
 @take.on(table.Repeated, Processor)
 def _repeated(row, s, step):
     for k in range(row.count(s)):

@@ -117,6 +117,12 @@ class Once(NamedTuple):
     function: Any
 
 
+class InThreads(NamedTuple):
+    """Calls ``function(s, mode)`` once, which divides its own loops among threads by `mode`."""
+
+    function: Any
+
+
 class WorkOfLoads(NamedTuple):
     """Sums the work of nodal loads; `again`: velocities have been mapped again after the move."""
 

@@ -77,11 +77,13 @@ def _body(hub: Hub, fix: RigidBody, nodes: int) -> motion.FreeBody:
         )
         slots = np.concatenate([slots, *([(a + k, b + k) for k in range(3)] for a, b in first)])
     ends = fix.body.first_id, fix.body.first_id + fix.body.count
+    listed = motion.records(motion.CONTACT, capacity)
     return motion.FreeBody(
         field=hub.update.method.lattice_of(hub, fix.body), ids=np.array(ends), dofs=fix.dofs,
         constants=fix.constants, state=fix.state, numbers=fix.numbers, slots=slots,
         formulas=_formulas(hub, fix), solution=motion.new_solution(),
-        contacts=motion.records(motion.CONTACT, capacity), count=np.zeros(1, np.int64),
+        contacts=listed, words=listed.view(np.int64).reshape(capacity, -1),
+        count=np.zeros(1, np.int64),
         pairs=ListedPairs(np.empty((pairs, 2), np.int64), np.empty((pairs, d)), np.empty(pairs)),
         surfaces=surfaces,
     )  # fmt: skip
