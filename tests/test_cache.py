@@ -22,7 +22,7 @@ from numba import config
 from karamelo_py.compiler import files, kernel, point_function
 from karamelo_py.compiler.code import machine
 from karamelo_py.compiler.disk import cache
-from karamelo_py.compiler.threads import Threaded, shared_out
+from karamelo_py.compiler.threads import Serial, Threaded, shared_out
 from karamelo_py.compiler.trace import choices
 from karamelo_py.compiler.trace.lowering import FunctionType
 from karamelo_py.compiler.trace.session import session
@@ -522,7 +522,7 @@ def test_loops_that_one_function_makes_are_kept_side_by_side(tmp_path, monkeypat
     for expected in (5, 0):
         with listening() as names:
             for function in functions:
-                each_node(function).loop(cells)
+                each_node(function).loop(cells, Serial())
         assert len(names) == expected
     assert cells.a.tolist() == [30.0] * 4
 

@@ -30,6 +30,7 @@ import numpy as np
 
 from karamelo_py.compiler import kernel, noinline, point_function
 from karamelo_py.compiler.fields import Field, field
+from karamelo_py.compiler.threads import shared_out
 from karamelo_py.compiler.tuples import record
 from karamelo_py.kernels.arrays import (
     DT,
@@ -46,7 +47,7 @@ from karamelo_py.kernels.arrays import (
 )
 from karamelo_py.kernels.equations.loss import FrictionalHeat, warm_node
 from karamelo_py.kernels.equations.mass_momentum import Centre, ContactImpulse, Normal
-from karamelo_py.kernels.table import AtNodes, Once, each_node
+from karamelo_py.kernels.table import AtNodes, EachNode, Once
 from karamelo_py.kernels.totals import (
     CONTACT_LOSS,
     WORK,
@@ -66,6 +67,7 @@ EDGE = 0.03  # above which a face ends or is round
 FACING = 0.3  # directions with a larger cosine count as the same
 FULL = 1.05  # filled fraction of the cells around a node above which a liquid has no gap
 MEMORY = 100  # steps after a contact in which bodies without a firm surface approach a wall slowly
+NOWHERE = -1  # after the last place of a list
 REPEATS = 16  # iterations for more than two fields; each at least halves the remaining approach
 
 
@@ -100,6 +102,7 @@ class SeparateFields(NamedTuple):
     memory: np.ndarray  # (F,) steps for which a contact is remembered
     fluid: np.ndarray  # (F,) bool
     surface: np.ndarray  # (F, k) distance to the surface by mean position, in cells
+    places: np.ndarray  # (N,) scratch: nodes where fields meet
     meeting: np.ndarray  # (F,) int64 scratch: fields that meet
     partners: np.ndarray  # (F,) int64 scratch: contacts of each field
     change: np.ndarray  # (F, k) scratch: velocity changes
@@ -503,6 +506,18 @@ def _meet(contact, nodes, n):
     return count
 
 
+def _is_shared(contact, nodes, n):
+    """Return True if several fields have mass at node `n`, whose field is the first of them."""
+    count, others = 0, 0
+    if nodes.sums[n, MASS] > 0:
+        a = n // contact.stride
+        for b in range(contact.slot.size):
+            if nodes.sums[n + (b - a) * contact.stride, MASS] > 0:
+                count += 1
+                others += 1 if b < a else 0
+    return count > 1 and others == 0
+
+
 @noinline
 def _node(contact, node, i):
     return node + contact.meeting[i] * contact.stride
@@ -700,17 +715,13 @@ def touch_node(bodies, grids, control, n):
         _touch_place(bodies, control, count, Where(node, x, h, control.values[DT], step))
 
 
-@noinline
-def _forget_contact(kin, nodes, n):
+def _begin_node(s, n):
+    contact, kin, nodes = s.contact, s.kin, s.nodes
     impulse, change = field(nodes.fields, ContactImpulse), field(nodes.fields, StrainingChange)
     for k in range(len(kin.Unknown._fields)):
         impulse[n, k] = 0
     for k in range(0 if nodes.sums[n, MASS] > 0 else kin.dimension):
         change[n, k] = 0
-
-
-@noinline
-def _keep_rigid(contact, kin, nodes, n):
     if contact.rigid[n // contact.stride] and nodes.sums[n, MASS] > 0:
         for k in range(kin.dimension):
             v = nodes.sums[n, of_momentum(kin) + k] / nodes.sums[n, MASS]
@@ -749,11 +760,51 @@ def _bodies(s):
     return Bodies(s.contact, s.kin, s.nodes)
 
 
+def _listing(begin):
+    """Make a loop that lists the places where fields meet, after ``begin(s, n)`` for each node."""
+
+    @shared_out
+    def list_places(s, k):
+        first, end = s.spans[k + 1, 0], s.spans[k + 1, 1]
+        found = first
+        for n in range(first, end):
+            begin(s, n)
+            if _is_shared(s.contact, s.nodes, n):
+                s.contact.places[found] = n
+                found += 1
+        if found < end:
+            s.contact.places[found] = NOWHERE
+
+    @kernel
+    def loop(s, mode):
+        list_places(mode, s.spans[0, 0], s)
+
+    return loop
+
+
+_list_places = _listing(lambda s, n: None)
+
+
+def _each_place(function, anew):
+    """Visit the places where several fields meet, which are listed `anew` or already."""
+
+    @kernel
+    def loop(s, mode):
+        if anew:
+            _list_places(s, mode)
+        for k in range(1, 1 + s.spans[0, 0]):
+            for q in range(s.spans[k, 0], s.spans[k, 1]):
+                if s.contact.places[q] == NOWHERE:
+                    break
+                function(s, s.contact.places[q])
+
+    return EachNode(function, loop)
+
+
 SeparateFields.rows = (  # type: ignore[attr-defined]
     Once(_begin_forces),
-    each_node(lambda s, n: _forget_contact(s.kin, s.nodes, n)),
-    each_node(lambda s, n: _keep_rigid(s.contact, s.kin, s.nodes, n)),
-    each_node(lambda s, n: touch_node(_bodies(s), s.grids, s.control, n)),
+    EachNode(_begin_node, _listing(_begin_node)),
+    _each_place(lambda s, n: touch_node(_bodies(s), s.grids, s.control, n), False),
     Once(_publish_forces),
     AtNodes(POST_CONTACT, ON_UPDATE),
 )
@@ -869,7 +920,7 @@ def _stay(steps):
             if steps:
                 _count_strain(bodies, s.control, place)
 
-    return (each_node(stay),)
+    return (_each_place(stay, not steps),)
 
 
 def _work_by_update(s, n):
@@ -882,4 +933,4 @@ def _work_by_update(s, n):
 
 SeparateFields.rows_before = _stay(0)  # type: ignore[attr-defined]
 SeparateFields.rows_after = _stay(1)  # type: ignore[attr-defined]
-SeparateFields.rows_work = (each_node(_work_by_update),)  # type: ignore[attr-defined]
+SeparateFields.rows_work = (_each_place(_work_by_update, False),)  # type: ignore[attr-defined]

@@ -13,7 +13,7 @@ from karamelo_py.kernels import arrays, rigid_links
 from karamelo_py.kernels import rigid_motion as motion
 from karamelo_py.kernels.contact import Bodies, SeparateFields, closing_part, list_pairs
 from karamelo_py.kernels.surfaces import Surface, closest, depth, encloses, place_on, slopes
-from karamelo_py.kernels.table import AtNodes, InThreads, Once, each_node, each_point
+from karamelo_py.kernels.table import AtNodes, InThreads, Once, each_node_apart, each_point
 from karamelo_py.kernels.totals import CONTACT_LOSS, WORK, add_to
 from karamelo_py.kernels.touching import ASIDE, CALL, direction_of
 from karamelo_py.kernels.views import location_at, state_at, volume_of
@@ -511,8 +511,8 @@ class FreeBodies(NamedTuple):
     links: rigid_links.NoLinks | rigid_links.Links
     rows_first = (InThreads(_meet),)
     rows_last = Once(_part), each_point(_lead_point, Rigid)
-    rows_before = (each_node(lambda s, n: _follow(s, n, False)),)
-    rows_after = (each_node(lambda s, n: _follow(s, n, True)),)
+    rows_before = (each_node_apart(lambda s, n: _follow(s, n, False)),)
+    rows_after = (each_node_apart(lambda s, n: _follow(s, n, True)),)
     rows_work = ()
 
 

@@ -14,7 +14,7 @@ from karamelo_py.compiler.tuples import record
 from karamelo_py.kernels.arrays import MASS, of_change, of_force, of_momentum
 from karamelo_py.kernels.clock import kick
 from karamelo_py.kernels.equations import RigidSums
-from karamelo_py.kernels.table import Once, each_node, each_point
+from karamelo_py.kernels.table import Once, each_node, each_node_apart, each_point
 from karamelo_py.kernels.totals import WORK, add_to, carry, counts, publish
 from karamelo_py.kernels.views import location_at
 from karamelo_py.points.basis import entry, locate, support
@@ -101,7 +101,7 @@ PUBLISH = Once(_begin_sums), each_point(_add_forces, Rigid), Once(_publish_sums)
 class RigidBodies(NamedTuple):
     node_fields = (RigidSums,)
     rows = (each_node(lambda s, n: _impose(_at_nodes(s), kick(s), s.control, n)), *PUBLISH)
-    rows_before = rows_after = (each_node(lambda s, n: _impose_on_strain(_at_nodes(s), n)),)
+    rows_before = rows_after = (each_node_apart(lambda s, n: _impose_on_strain(_at_nodes(s), n)),)
     rows_work = ()
 
     force: np.ndarray  # (n,) slot of the force on each point's solid, or -1

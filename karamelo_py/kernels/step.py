@@ -83,7 +83,7 @@ def _node_task(row, s, step):
 
 @take.on(table.EachNode, Processor)
 def _each_node(row, s, step):
-    row.loop(s)
+    row.loop(s, step.mode)
 
 
 @take.on(table.EachPoint, Processor)

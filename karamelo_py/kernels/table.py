@@ -12,6 +12,7 @@ from typing import Any, NamedTuple
 
 from karamelo_py.compiler import kernel, point_function, real
 from karamelo_py.compiler.fields import field
+from karamelo_py.compiler.threads import shared_out
 from karamelo_py.kernels import arrays
 from karamelo_py.kernels.arrays import Setup, Tag
 from karamelo_py.kernels.clock import take_reports
@@ -97,7 +98,7 @@ class NodeTask(NamedTuple):
 
 
 class EachNode(NamedTuple):
-    """Calls ``function(s, n)`` at every node in use, by ``loop(s)``."""
+    """Calls ``function(s, n)`` at every node in use, by ``loop(s, mode)``."""
 
     function: Any
     loop: Any
@@ -159,10 +160,25 @@ class Sweep(NamedTuple):
 
 def each_node(function: Any) -> EachNode:
     @kernel
-    def loop(s):
+    def loop(s, mode):
         for r in range(1, 1 + s.spans[0, 0]):
             for n in range(s.spans[r, 0], s.spans[r, 1]):
                 function(s, n)
+
+    return EachNode(function, loop)
+
+
+def each_node_apart(function: Any) -> EachNode:
+    """Divide a loop over nodes among threads; `function` changes only values of its node."""
+
+    @shared_out
+    def visit_span(s, k):
+        for n in range(s.spans[k + 1, 0], s.spans[k + 1, 1]):
+            function(s, n)
+
+    @kernel
+    def loop(s, mode):
+        visit_span(mode, s.spans[0, 0], s)
 
     return EachNode(function, loop)
 
@@ -397,7 +413,7 @@ def _axis_of(grids, g):
 
 
 @kernel
-def _hold_axis(s):
+def _hold_axis(s, mode):
     for g in range(s.grids.first.size):
         begin, end = _axis_of(s.grids, g)
         for n in range(begin, end):

@@ -177,6 +177,7 @@ class ULMPMContacts(Method):
             prescribed=np.zeros((nodes, unknown), np.int32),
             reactions=np.zeros(1 + len(hub.values.array), np.int64),
             forces=np.zeros(1 + len(hub.values.array), np.int64),
+            places=np.zeros(nodes, np.int64),
             meeting=np.zeros(count, np.int64),
             partners=np.zeros(count, np.int64),
             change=np.zeros((count, unknown)),
