@@ -14,7 +14,7 @@ from karamelo_py.compiler.tuples import record
 from karamelo_py.kernels.arrays import MASS, of_change, of_force, of_momentum
 from karamelo_py.kernels.clock import kick
 from karamelo_py.kernels.equations import RigidSums
-from karamelo_py.kernels.table import Once, each_node, each_node_apart, each_point
+from karamelo_py.kernels.table import EachPoint, Once, each_node, each_node_apart
 from karamelo_py.kernels.totals import WORK, add_to, carry, counts, publish
 from karamelo_py.kernels.views import location_at
 from karamelo_py.points.basis import entry, locate, support
@@ -61,6 +61,13 @@ def _impose_on_strain(at, n):
             nodes.velocity[n, k] = rigid[n, of_momentum(kin) + k] / rigid[n, MASS]
 
 
+def _is_loaded(kin, rigid, n):
+    loaded = False
+    for k in range(kin.dimension):
+        loaded = loaded or rigid[n, of_force(kin) + k] != 0
+    return loaded
+
+
 def _add_forces(s, block, p):
     basis, kin, points, totals, d = s.basis, s.kin, block.points, s.control.totals, s.kin.dimension
     rigid, forces, torques = field(s.nodes.fields, RigidSums), s.contact.force, s.contact.torque
@@ -71,7 +78,7 @@ def _add_forces(s, block, p):
     first, turning = forces[points.id[p]], torques[points.id[p]]
     for node in range(support(basis, kin)):
         n, weight, _ = entry(basis, kin, grid, stencil, node)
-        if not weight > 0:
+        if not weight > 0 or not _is_loaded(kin, rigid, n):
             continue
         mass_fraction = weight * points.mass[p] / rigid[n, MASS]
         x = node_position(grid, n)
@@ -80,6 +87,28 @@ def _add_forces(s, block, p):
             j, k = (i + 1) % 3, (i + 2) % 3
             add_to(totals, first + i, force[i])
             add_to(totals, turning + i, x[j] * force[k] - x[k] * force[j])
+
+
+@noinline
+def _is_tile_loaded(s, tiling, t):
+    """Return True if a rigid solid acts on a node in reach of a tile's points."""
+    grid, d = record(s.grids, tiling.grid[t]), s.kin.dimension
+    rigid = field(s.nodes.fields, RigidSums)
+    ends = [(tiling.box[t, c], tiling.box[t, d + c] + 1) if c < d else (0, 1) for c in range(3)]
+    for i in range(ends[0][0], ends[0][1]):
+        for j in range(ends[1][0], ends[1][1]):
+            for k in range(ends[2][0], ends[2][1]):
+                if _is_loaded(s.kin, rigid, grid.first + i * grid.step_x + j * grid.step_y + k):
+                    return True
+    return False
+
+
+@kernel
+def _add_forces_by_tile(s, block):
+    for t in range(block.tiling.count[0]):
+        if _is_tile_loaded(s, block.tiling, t):
+            for p in range(block.tiling.range[t, 0], block.tiling.range[t, 1]):
+                _add_forces(s, block, p)
 
 
 @kernel
@@ -95,7 +124,11 @@ def _publish_sums(s):
         publish(s.control, slot, 3)
 
 
-PUBLISH = Once(_begin_sums), each_point(_add_forces, Rigid), Once(_publish_sums)
+PUBLISH = (
+    Once(_begin_sums),
+    EachPoint(_add_forces, Rigid, _add_forces_by_tile),
+    Once(_publish_sums),
+)
 
 
 class RigidBodies(NamedTuple):
