@@ -75,18 +75,19 @@ def _add_forces(s, block, p):
     stencil = locate(
         basis, kin, grid, location_at(basis, kin, points.x[s.control.motion[0].now], p)
     )
-    first, turning = forces[points.id[p]], torques[points.id[p]]
+    force = torque = (0.0, 0.0, 0.0)
     for node in range(support(basis, kin)):
         n, weight, _ = entry(basis, kin, grid, stencil, node)
-        if not weight > 0 or not _is_loaded(kin, rigid, n):
-            continue
-        mass_fraction = weight * points.mass[p] / rigid[n, MASS]
-        x = node_position(grid, n)
-        force = [mass_fraction * rigid[n, of_force(kin) + i] if i < d else 0.0 for i in range(3)]
-        for i in range(3):
-            j, k = (i + 1) % 3, (i + 2) % 3
-            add_to(totals, first + i, force[i])
-            add_to(totals, turning + i, x[j] * force[k] - x[k] * force[j])
+        if weight > 0 and _is_loaded(kin, rigid, n):
+            mass_fraction = weight * points.mass[p] / rigid[n, MASS]
+            x = node_position(grid, n)
+            here = [mass_fraction * rigid[n, of_force(kin) + i] if i < d else 0.0 for i in range(3)]
+            force = tuple([a + b for a, b in zip(force, here, strict=True)])
+            turning = [x[i - 2] * here[i - 1] - x[i - 1] * here[i - 2] for i in range(3)]
+            torque = tuple([a + b for a, b in zip(torque, turning, strict=True)])
+    for i in range(3):
+        add_to(totals, forces[points.id[p]] + i, force[i])
+        add_to(totals, torques[points.id[p]] + i, torque[i])
 
 
 @noinline
