@@ -210,26 +210,28 @@ def _place(contact, n, k):
     return n % contact.stride // contact.beside[k, 0] % contact.beside[k, 1]
 
 
-@noinline
-def _kept(contact, n, k):
-    return 1.0 if 0 < _place(contact, n, k) < contact.beside[k, 1] - 1 else 0.0
+def _places(bodies, n):
+    """Return the indices of node `n` along the axes."""
+    return tuple([_place(bodies.contact, n, k) for k in range(bodies.kin.dimension)])
+
+
+def _kept(contact, place, k):
+    return 1.0 if 0 < place < contact.beside[k, 1] - 1 else 0.0
 
 
 @noinline
-def _beside(contact, kin, n, which):
-    beside, inside = n, True
-    for k in range(kin.dimension):
-        way = which // 3**k % 3 - 1
-        beside += way * contact.beside[k, 0]
-        inside = inside and 0 <= _place(contact, n, k) + way < contact.beside[k, 1]
-    return beside, inside
-
-
-@noinline
-def _face(bodies, n):
+def _face(bodies, n, places, which):
+    """Return the outward direction at neighbour `which` of node `n`, and whether it exists."""
     contact, kin, nodes = bodies
-    gradient = vector_at(kin, field(nodes.fields, Normal), n, 0, zero_vector(kin, 0.0))
-    return vector(kin, [_kept(contact, n, k) * of_axis for k, of_axis in enumerate(gradient)])
+    ways = [which // 3**k % 3 - 1 for k in range(kin.dimension)]
+    beside, inside = n, True
+    for k, way in enumerate(ways):
+        beside += way * contact.beside[k, 0]
+        inside = inside and 0 <= places[k] + way < contact.beside[k, 1]
+    at = beside if inside else n
+    face = vector_at(kin, field(nodes.fields, Normal), at, 0, zero_vector(kin, 0.0))
+    kept = [_kept(contact, places[k] + way, k) for k, way in enumerate(ways)]
+    return vector(kin, [a * b for a, b in zip(kept, face, strict=True)]), inside
 
 
 def _cosine_above(a, b, least):
@@ -250,11 +252,12 @@ def _normal(bodies, n, other):
     normal at the edge of a block on a base of equal density is tilted by 15 degrees.)
     """
     contact, kin, _ = bodies
-    total, lengths = zero_vector(kin, 0.0), 0.0
+    total, lengths, places = zero_vector(kin, 0.0), 0.0, _places(bodies, n)
+    per_mass = contact.per_mass[n // contact.stride]
     for which in range(3**kin.dimension):
-        beside, inside = _beside(contact, kin, n, which)
+        face, inside = _face(bodies, n, places, which)
         if inside:
-            term = contact.per_mass[n // contact.stride] * _face(bodies, beside)
+            term = per_mass * face
             for k in range(kin.dimension):
                 term = (0.5 if which // 3**k % 3 == 1 else 0.25) * term
             if not _cosine_above(term, other, FACING):
@@ -265,18 +268,17 @@ def _normal(bodies, n, other):
         scatter = max(1.0 - square / (lengths * lengths), 0.0) + SCATTER
         total = square / (scatter * scatter) * total
     if kin.hoops:  # no radial component on the axis
-        total = vector(kin, [_kept(contact, n, 0) * total[0], *total[1:]])
+        total = vector(kin, [_kept(contact, places[0], 0) * total[0], *total[1:]])
     return total, scatter
 
 
 @noinline
 def _is_hollow(bodies, n, normal, other):
     """Return True if two faces towards the other body face each other around a node."""
-    contact, kin, _ = bodies
+    kin, places = bodies.kin, _places(bodies, n)
     turn, square = 0.0, dot(normal, normal)
     for which in range(3**kin.dimension):
-        beside, inside = _beside(contact, kin, n, which)
-        face = _face(bodies, beside if inside else n)
+        face, inside = _face(bodies, n, places, which)
         if inside and square > 0 and _cosine_above(face, -1.0 * other, FACING):
             way = vector(kin, [float(which // 3**k % 3 - 1) for k in range(kin.dimension)])
             turn += dot(face, way) - dot(face, normal) * dot(way, normal) / square
@@ -286,11 +288,10 @@ def _is_hollow(bodies, n, normal, other):
 @noinline
 def _entering(bodies, n, other, velocity, least):
     """Return the largest velocity component, if above `least`, into a face towards `other`."""
-    contact, kin, _ = bodies
+    kin, places = bodies.kin, _places(bodies, n)
     most, penetrating = least, zero_vector(kin, 0.0)
     for which in range(3**kin.dimension):
-        beside, inside = _beside(contact, kin, n, which)
-        face = _face(bodies, beside if inside else n)
+        face, inside = _face(bodies, n, places, which)
         speed, square = -dot(face, velocity), dot(face, face)
         if inside and speed > most * sqrt(square) and _cosine_above(face, -1.0 * other, FACING):
             most = speed / sqrt(square)
