@@ -229,7 +229,7 @@ class Hooks(NamedTuple):
 
     evaluate: int  # address of the formula evaluator
     table: np.ndarray  # (k,) HOOK
-    programs: np.ndarray  # (k, 4) PROGRAM: components, friction at a wall
+    programs: np.ndarray  # (k, n) PROGRAM: three components, friction at a wall, values of a tool
     members: np.ndarray  # int64: node numbers, or bits per point
     code: np.ndarray  # (c, 2) int64, of formulas
     constants: np.ndarray  # (m,) float64

@@ -739,15 +739,18 @@ def _act_on_warmth(members, task, call, count):
 def _of_time(tag, kin, call):
     """Return the formulas of time now and at the end of the step, dt and kick of contact, kick."""
     values = []
-    for shift in (0.0, call.dt):
+    for k in range(0 if tag.ahead else len(tag.values)):
+        values.append(_one_of_time(call, FRICTION + 1 + k, 0.0))
+    for shift in (0.0, call.dt) if tag.ahead else ():
         for c in range(kin.dimension):
-            if c < len(tag.values):
-                evaluate(call, c, 1, VALUE, shift)
-                values.append(call.hooks.scratch[VALUE, 0])
-            else:
-                values.append(0.0)
+            values.append(_one_of_time(call, c, shift) if c < len(tag.values) else 0.0)
     step = call.control.step[0]
     return (*values, step.contact_dt, step.contact_kick, step.kick)
+
+
+def _one_of_time(call, component, shift):
+    evaluate(call, component, 1, VALUE, shift)
+    return call.hooks.scratch[VALUE, 0]
 
 
 @act.on(WholePoints)

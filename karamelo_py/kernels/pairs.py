@@ -12,17 +12,18 @@ import numpy as np
 from karamelo_py.compiler import at_hand, kernel, noinline
 from karamelo_py.compiler.fields import load_vector
 from karamelo_py.kernels.arrays import Tag, vector_at
-from karamelo_py.kernels.rubbing import rubbed
 from karamelo_py.kernels.views import deformation_of, state_at, volume_of
 from karamelo_py.points.bodies import (
     NEW,
     Face,
+    FrictionMemory,
     Hertz,
     MeetingFaces,
     TouchingPair,
     along,
     force_between,
     radius,
+    rub,
 )
 from karamelo_py.points.kinematics import inv, zero_vector
 
@@ -240,6 +241,17 @@ def _push_between(push, bodies, i, j):
     return force_between(law, kin, pair)
 
 
+def _rubbed(mu, load, hold, stop, at):
+    """Return the friction (d,) on a point, and update its contact history ``at`` = (grip, row)."""
+    (grip, i), d = at, len(hold)
+    memory = FrictionMemory(hold, grip[i, d], grip[i, d + 1])
+    force, (hold, mean, unused) = rub(mu, load, memory, stop)
+    for k in range(d):
+        grip[i, k] = hold[k]
+    grip[i, d], grip[i, d + 1] = mean, unused
+    return force
+
+
 @noinline
 def _face(kin, bodies, i):
     normal, d = vector_at(kin, bodies.face, i, 0, zero_vector(kin, 0.0)), kin.dimension
@@ -287,7 +299,7 @@ def _rub(push, bodies, i, contact):
     slide = kin.Vector._make([contact[1 + d + k] for k in range(d)])
     slid = push.step if grip[i, d] > 0 else 0.0  # a point without contact before has not slid
     hold = along(vector_at(kin, grip, i, 0, none) + slid * slide, normal)
-    force = rubbed(push.law.friction, contact[0], hold, push.dt * slide, (grip, i))
+    force = _rubbed(push.law.friction, contact[0], hold, push.dt * slide, (grip, i))
     for k in range(d):
         contact[1 + d + k] = force[k]
 

@@ -48,7 +48,7 @@ class Touch(NamedTuple):
     lost: int  # address of a function that reports points without a way out
 
     of_nodes = False
-    of_time = True  # evaluates formulas of time also at the end of the step
+    of_time = ahead = True  # evaluates formulas of time also at the end of the step
 
 
 def direction_of(falls, step):

@@ -16,7 +16,7 @@ from __future__ import annotations
 
 import sys
 from collections import namedtuple
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from typing import Any, NamedTuple
 
 from karamelo_py.compiler import point_function, real
@@ -62,8 +62,12 @@ def law_parts(law: tuple) -> Iterator[tuple]:
 
 def can(law: NamedTuple, function: Callable) -> bool:
     """Return True if the law or a part itself, not a wrapped law, defines the point function."""
-    kinds = (kind for kind in law_kind(law) if function.defined(kind))
-    return any(function.find((kind,)) not in _delegating for kind in kinds)
+    return defined_by(law_kind(law), function)
+
+
+def defined_by(kinds: Iterable[type], function: Callable) -> bool:
+    defining = (kind for kind in kinds if function.defined(kind))
+    return any(function.find((kind,)) not in _delegating for kind in defining)
 
 
 def answered(law: NamedTuple, function: Callable) -> bool:

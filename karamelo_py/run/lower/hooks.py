@@ -43,7 +43,7 @@ def lower_hooks(
     return arrays.Hooks(
         evaluate=address_of(evaluate_in_table, EVALUATE),
         table=np.array(builder.rows, arrays.HOOK).view(np.recarray),
-        programs=np.array(builder.programs, arrays.PROGRAM).view(np.recarray),
+        programs=builder.table_of_programs(),
         members=np.concatenate([np.empty(0, np.int64), *builder.members]),
         code=code,
         constants=constants,
@@ -126,7 +126,7 @@ class _Builder:
             slot = self.hub.values.slot(f"{fix.id}_{first}")
         if hook.tag is not None:
             address = arrays.WHOLE
-            self.whole.append(hook.tag(len(self.rows), (1,) * len(fix.formulas)))
+            self.whole.append(hook.tag(len(self.rows), (1,) * len(fix.formulas + fix.numbers)))
         else:
             with as_script_error(f"fix {fix.style}", moment, hook.function, fix.mark):
                 address = address_of(hook.function, hook.signature)
@@ -146,7 +146,8 @@ class _Builder:
         formulas_of_hook = (Expression(0.0) if f is None and whole else f for f in fix.formulas)
         programs = list(map(self.formulas.add, formulas_of_hook))
         programs += [NO_PROGRAM] * (FRICTION - len(programs))
-        self.programs.append([*programs, self.formulas.add(fix.wall_friction)])
+        programs += map(self.formulas.add, (fix.wall_friction, *fix.numbers))
+        self.programs.append(programs)
         self.uses_first |= not hook.on_nodes and any(f.names & FIRST for f in formulas)
         if hook.holds and hook.on_nodes:
             self.holding.append(fix)
@@ -154,6 +155,11 @@ class _Builder:
         rubs = fix.wall_friction is not None
         if early or (late and (not holds or rubs or self.rigid)):
             self.loaded_nodes = self.hub.fields.node_count
+
+    def table_of_programs(self) -> np.ndarray:
+        width = max(map(len, self.programs))
+        rows = [[*row, *[NO_PROGRAM] * (width - len(row))] for row in self.programs]
+        return np.array(rows, arrays.PROGRAM).view(np.recarray)
 
     def shared_nodes(self) -> int:
         fixes = self.holding

@@ -5,6 +5,18 @@ from typing import Any
 
 import numpy as np
 
+from karamelo_py.kernels.tools import (
+    Ball,
+    ByModulus,
+    Plane,
+    Press,
+    PushedPoint,
+    Stiff,
+    find_depths,
+    press_hook,
+    press_kind,
+    push_points,
+)
 from karamelo_py.language.rules import known_failure
 from karamelo_py.output.point_table import PointTable
 from karamelo_py.points.laws import elastic_law, parameter
@@ -47,11 +59,6 @@ class ToolFix(PointForces):
         self.now(*components)
         return components
 
-    def from_origin(
-        self, points: PointsView | PointTable, origin: Sequence[Expression]
-    ) -> np.ndarray:
-        return points.position.astype(float) - self.now(*origin)
-
     def side(self, points: PointsView) -> np.ndarray:
         domain = self.hub.domain
         return (points.column("volume") / domain.depth(points.position)) ** (1 / domain.dimension)
@@ -72,13 +79,6 @@ def _shear_modulus(solid: Solid) -> float:
     return float(parameter(law, "G") or parameter(parameter(law, "strength"), "G"))
 
 
-def unit(vector: np.ndarray) -> np.ndarray:
-    length = np.linalg.norm(vector)
-    if not (np.isfinite(length) and length > 0):
-        raise ScriptError("the normal has no direction", expected="a vector that is not 0")
-    return vector / length
-
-
 def begin_behind(plane: Any, scene: Any) -> Any:
     if scene.simulation.step > 0:
         return False
@@ -88,26 +88,65 @@ def begin_behind(plane: Any, scene: Any) -> Any:
     return {"which": which, "depth": max(depths)} if count else False
 
 
-class PlaneTool(ToolFix):
+class ShapedTool(ToolFix):
+    """Base of tools with a `shape`, whose values are the last of `numbers`."""
+
+    kind_of_press: type[Press] = Press
+    grip: type | None = None
+    shape: Any
+    law: Any
+    first = 0  # index of the first value of the shape
+
+    def push(self, law: Any, *numbers: Expression) -> None:
+        """Set the law of the force, and its value, if any, and those of the shape."""
+        self.law, self.numbers, self.first = law, numbers, 0 if isinstance(law, Stiff) else 1
+        self.now(*numbers)  # raises ScriptError for formulas of position
+        self.initial_integrate = press_hook(self._press)
+
+    def by_modulus(self, *, by_side: bool = False) -> ByModulus:
+        """Return a force proportional to the shear modulus of each solid."""
+        solids = list(self.hub.solids.values())
+        moduli = np.array([_shear_modulus(solid) for solid in solids])
+        return ByModulus(by_side, moduli, np.array([solid.first_id for solid in solids]))
+
+    def _press(self, row: int, values: tuple) -> Press:
+        return press_kind(self.kind_of_press, self.grip)(row, values, self.shape, self.law)
+
+    def depth_of(self, points: PointTable) -> np.ndarray:
+        x, kin = points.position.astype(float), self.hub.domain.kin
+        depths = np.empty(len(x))
+        values = tuple(self.now(*self.numbers[self.first :]).tolist())
+        find_depths(kin, self.shape, values, x, depths)
+        return depths
+
+    def forces(self, points: PointsView) -> np.ndarray:
+        """Return the forces (n, d) in load steps."""
+        x, force = points.position.astype(float), np.empty(points.position.shape)
+        modulus = self.stiffness(points) if isinstance(self.law, ByModulus) else np.zeros(len(x))
+        seen = PushedPoint(x, points.mass.astype(float), self.side(points), modulus)
+        tag, values = self._press(0, ()), tuple(self.now(*self.numbers).tolist())
+        push_points(self.hub.domain.kin, tag, values, seen, force)
+        return force
+
+
+class PlaneTool(ShapedTool):
     """Base of tools with a plane. Points belong on the side to which the normal points."""
 
-    def lay(self, origin: Sequence[Expression], normal: Sequence[Expression]) -> None:
-        self.origin = self.of_time("", origin)
+    shape = Plane()
+
+    def lay(self, origin: Sequence[Expression], normal: Sequence[Expression]) -> tuple:
+        """Return the formulas of the shape."""
+        origin = self.of_time("", origin)
         self.towards = self.of_time("n", normal)
-        if not self.hub.rehearsing:  # in a rehearsal, some values are unknown
-            unit(self.now(*self.towards))
+        size = np.linalg.norm(self.now(*self.towards))
+        # in a rehearsal, some values are unknown
+        if not self.hub.rehearsing and not (np.isfinite(size) and size > 0):
+            raise ScriptError("the normal has no direction", expected="a vector that is not 0")
+        return *origin, *self.towards
 
     def is_endless(self, axis: int) -> bool:
         normal = self.towards[axis]
         return normal.is_constant and normal.constant == 0
-
-    def depth(self, points: PointsView | PointTable) -> tuple[np.ndarray, np.ndarray]:
-        """Return the depth (n,) of points past the plane, and the normal (d,)."""
-        normal = unit(self.now(*self.towards))
-        return -(self.from_origin(points, self.origin) @ normal), normal
-
-    def depth_of(self, points: PointTable) -> np.ndarray:
-        return self.depth(points)[0]
 
 
 known_failure(
@@ -120,7 +159,7 @@ known_failure(
 )
 
 
-class BallTool(ToolFix):
+class BallTool(ShapedTool):
     """Base of balls (in 2D disks) with a `centre` and a radius `R`.
 
     Parameters
@@ -134,11 +173,7 @@ class BallTool(ToolFix):
     """
 
     published = ("x", "y", "z", "s")
-    R: Expression
-    centre: tuple[Expression, ...]
-
-    def depth_of(self, points: PointTable) -> np.ndarray:
-        return self.now(self.R) - np.linalg.norm(self.from_origin(points, self.centre), axis=1)
+    shape = Ball()
 
 
 known_failure(

@@ -2,19 +2,17 @@
 
 from typing import Annotated
 
-import numpy as np
-
+from karamelo_py.kernels.tools import Stiff
 from karamelo_py.language.signature import NonNegative
 from karamelo_py.scene.group import ParticleGroup
 from karamelo_py.scene.hub import Hub
 from karamelo_py.scene.solid import Solid
-from karamelo_py.scene.views import PointsView
 from karamelo_py.script.expressions import Expression
 from karamelo_py.styles.fixes.tools.base import PlaneTool
-from karamelo_py.styles.fixes.tools.stiff import CLOSE, StiffTool
+from karamelo_py.styles.fixes.tools.stiff import StiffShape
 
 
-class ContactMinimizePenetrationPlane(StiffTool, PlaneTool):
+class ContactMinimizePenetrationPlane(StiffShape, PlaneTool):
     """Apply contact of a solid with a plane, as stiff as the step allows, with friction.
 
     Parameters
@@ -55,13 +53,4 @@ class ContactMinimizePenetrationPlane(StiffTool, PlaneTool):
     ):  # fmt: skip
         super().__init__(hub, ParticleGroup.of(hub, solid))
         self.rubs(hub, mu)
-        self.lay((x, y, z), (nx, ny, nz))
-
-    def forces(self, points: PointsView) -> np.ndarray:
-        depth, normal = self.depth(points)
-        radius = self.side(points) / 2
-        depth = depth + radius
-        normals = np.broadcast_to(normal, (len(depth), len(normal)))
-        x = points.position.astype(float)
-        touching = depth > -CLOSE * radius
-        return self.press(points, depth, touching, normals, velocity=0.0, seen=x)
+        self.push(Stiff(mu), *self.lay((x, y, z), (nx, ny, nz)))

@@ -2,19 +2,16 @@
 
 from typing import Annotated
 
-import numpy as np
-
+from karamelo_py.kernels.tools import Wedge
 from karamelo_py.language.signature import NonNegative
-from karamelo_py.output.point_table import PointTable
 from karamelo_py.scene.group import ParticleGroup
 from karamelo_py.scene.hub import Hub
-from karamelo_py.scene.views import PointsView
 from karamelo_py.script.errors import ScriptError
 from karamelo_py.script.expressions import Expression
-from karamelo_py.styles.fixes.tools.base import ToolFix
+from karamelo_py.styles.fixes.tools.base import ShapedTool
 
 
-class CuttingTool(ToolFix):
+class CuttingTool(ShapedTool):
     """Push points out of the tip of a rigid cutting tool, in 2D.
 
     Parameters
@@ -44,6 +41,7 @@ class CuttingTool(ToolFix):
     """
 
     needs_stiffness = True
+    shape = Wedge()
 
     def __init__(
         self, hub: Hub, group: ParticleGroup, K: Annotated[Expression, NonNegative],
@@ -54,31 +52,9 @@ class CuttingTool(ToolFix):
         super().__init__(hub, group)
         if hub.domain.dimension != 2:
             raise ScriptError("this tool is for 2D", expected="a domain in 2D")
-        self.K = K
-        self.tip = self.of_time("", (x_tip, y_tip, z_tip))
-        self.ends = (xA, yA), (xB, yB)
-        if not hub.rehearsing:
-            self._faces()
-
-    def _faces(self) -> tuple[np.ndarray, np.ndarray]:
-        """Return the outward normals (2, 2) of the faces, and the tip."""
-        tip = self.now(*self.tip)
-        a, b = (self.now(*end) - tip for end in self.ends)
-        turn = a[0] * b[1] - a[1] * b[0]
-        if not abs(turn) > 0:
+        tip = self.of_time("", (x_tip, y_tip, z_tip))
+        self.push(self.by_modulus(), K, *tip, xA, yA, xB, yB)
+        ends = self.now(*tip, xA, yA, xB, yB).reshape(3, 2)
+        (ax, ay), (bx, by) = ends[1:] - ends[0]
+        if not hub.rehearsing and not abs(ax * by - ay * bx) > 0:
             raise ScriptError("tip, A and B lie in one line", expected="two faces with an angle")
-        normals = np.array([[a[1], -a[0]], [-b[1], b[0]]]) * np.sign(turn)
-        return normals / np.linalg.norm(normals, axis=1, keepdims=True), tip
-
-    def _depths(self, points: PointsView | PointTable) -> tuple[np.ndarray, np.ndarray]:
-        normals, tip = self._faces()
-        return (tip - points.position.astype(float)) @ normals.T, normals
-
-    def depth_of(self, points: PointTable) -> np.ndarray:
-        return self._depths(points)[0].min(axis=1)
-
-    def forces(self, points: PointsView) -> np.ndarray:
-        depths, normals = self._depths(points)
-        nearer = depths.argmin(axis=1)
-        depth = np.maximum(depths.min(axis=1), 0)
-        return (self.now(self.K) * self.stiffness(points) * depth)[:, None] * normals[nearer]

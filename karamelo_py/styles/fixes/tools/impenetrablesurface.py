@@ -2,12 +2,9 @@
 
 from typing import Annotated
 
-import numpy as np
-
 from karamelo_py.language.signature import NonNegative
 from karamelo_py.scene.group import ParticleGroup
 from karamelo_py.scene.hub import Hub
-from karamelo_py.scene.views import PointsView
 from karamelo_py.script.expressions import Expression
 from karamelo_py.styles.fixes.tools.base import PlaneTool
 
@@ -47,10 +44,4 @@ class ImpenetrableSurface(PlaneTool):
         nx: Expression, ny: Expression, nz: Expression,
     ):  # fmt: skip
         super().__init__(hub, group)
-        self.K = K
-        self.lay((xs, ys, zs), (nx, ny, nz))
-
-    def forces(self, points: PointsView) -> np.ndarray:
-        depth, normal = self.depth(points)
-        push = self.now(self.K) * self.stiffness(points) * np.maximum(depth, 0) * self.side(points)
-        return push[:, None] * normal
+        self.push(self.by_modulus(by_side=True), K, *self.lay((xs, ys, zs), (nx, ny, nz)))

@@ -4,11 +4,11 @@ from typing import Annotated, Literal, Self
 
 import numpy as np
 
+from karamelo_py.kernels.tools import BySquare, PressSquare
 from karamelo_py.language.signature import Argument, NonNegative
 from karamelo_py.language.unknown import words_of
 from karamelo_py.scene.group import ParticleGroup
 from karamelo_py.scene.hub import Hub
-from karamelo_py.scene.views import PointsView
 from karamelo_py.script.errors import ScriptError
 from karamelo_py.script.expressions import Expression
 from karamelo_py.styles.fixes.tools.base import BallTool
@@ -54,25 +54,17 @@ class Indent(BallTool):
     indent/minimize_penetration, impenetrablesurface
     """
 
+    kind_of_press = PressSquare
+
     def __init__(
         self, hub: Hub, group: ParticleGroup, kind: Literal["sphere"],
         K: Annotated[Expression, NonNegative], R: Radius,
         x: Expression, y: Expression, z: Expression,
     ):  # fmt: skip
         super().__init__(hub, group)
-        self.K, self.R = K, R
-        self.centre = self.of_time("", (x, y, z))
-        c, domain = self.now(*self.centre), hub.domain
+        centre = self.of_time("", (x, y, z))
+        self.push(BySquare(), K, R, *centre)
+        c, domain = self.now(*centre), hub.domain
         past = np.maximum(domain.lo[: len(c)] - c, c - domain.hi[: len(c)]).max()
-        if all(f.is_constant for f in (R, *self.centre)) and past > R.constant:
+        if all(f.is_constant for f in (R, *centre)) and past > R.constant:
             hub.warn("the ball is outside the domain", hint="K and R come before x, y, z")
-
-    def forces(self, points: PointsView) -> np.ndarray:
-        K, R = self.now(self.K, self.R)
-        away = self.from_origin(points, self.centre)
-        r = np.linalg.norm(away, axis=1)
-        depth = np.maximum(R - r, 0)
-        self.publish("s", points.total(depth > 0))
-        push = points.mass.astype(float) * K * depth**2
-        size = np.divide(push, r, out=np.zeros_like(r), where=r > 0)
-        return size[:, None] * away

@@ -2,18 +2,16 @@
 
 from typing import Annotated, Literal
 
-import numpy as np
-
+from karamelo_py.kernels.tools import PressBall, Stiff
 from karamelo_py.language.signature import NonNegative
 from karamelo_py.scene.group import ParticleGroup
 from karamelo_py.scene.hub import Hub
-from karamelo_py.scene.views import PointsView
 from karamelo_py.script.expressions import Expression
 from karamelo_py.styles.fixes.tools.base import BallTool
-from karamelo_py.styles.fixes.tools.stiff import CLOSE, StiffTool
+from karamelo_py.styles.fixes.tools.stiff import StiffShape
 
 
-class IndentMinimizePenetration(StiffTool, BallTool):
+class IndentMinimizePenetration(StiffShape, BallTool):
     """Press a rigid ball (in 2D a disk) into points, as stiff as the step allows.
 
     Parameters
@@ -42,24 +40,14 @@ class IndentMinimizePenetration(StiffTool, BallTool):
     indent, contact/minimize_penetration/plane, contact/minimize_penetration
     """
 
+    kind_of_press = PressBall
+
     def __init__(
         self, hub: Hub, group: ParticleGroup, kind: Literal["sphere"],
         R: Annotated[Expression, NonNegative], x: Expression, y: Expression, z: Expression,
         vx: Expression, vy: Expression, vz: Expression, mu: Annotated[float, NonNegative],
     ):  # fmt: skip
         super().__init__(hub, group)
-        self.R = R
         self.rubs(hub, mu)
-        self.centre = self.of_time("", (x, y, z))
-        self.velocity = self.of_time("v", (vx, vy, vz))
-
-    def forces(self, points: PointsView) -> np.ndarray:
-        away = self.from_origin(points, self.centre)
-        r = np.linalg.norm(away, axis=1, keepdims=True)
-        normal = np.divide(away, r, out=np.zeros_like(away), where=r > 0)
-        radius = self.side(points) / 2
-        depth = self.now(self.R) + radius - r[:, 0]
-        self.publish("s", points.total(self.face(points) * (depth > 0)))
-        velocity, x = self.now(*self.velocity), points.position.astype(float)
-        led, touching = velocity * points.dt, depth > -CLOSE * radius
-        return self.press(points, depth, touching, normal, velocity=velocity, seen=x, led=led)
+        centre, velocity = self.of_time("", (x, y, z)), self.of_time("v", (vx, vy, vz))
+        self.push(Stiff(mu), R, *centre, *velocity)

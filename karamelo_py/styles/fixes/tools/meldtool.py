@@ -1,20 +1,17 @@
 """The tool of additive friction stir deposition."""
 
-from typing import Annotated, Any, Literal
+from typing import Annotated, Literal
 
-import numpy as np
-
+from karamelo_py.kernels.tools import Channel
 from karamelo_py.language.signature import NonNegative
-from karamelo_py.output.point_table import PointTable
 from karamelo_py.scene.group import ParticleGroup
 from karamelo_py.scene.hub import Hub
-from karamelo_py.scene.views import PointsView
 from karamelo_py.script.errors import ScriptError
 from karamelo_py.script.expressions import Expression
-from karamelo_py.styles.fixes.tools.base import ToolFix
+from karamelo_py.styles.fixes.tools.base import ShapedTool
 
 
-class MeldTool(ToolFix):
+class MeldTool(ShapedTool):
     """Push points out of the tool of additive friction stir deposition, in 3D.
 
     Parameters
@@ -62,42 +59,5 @@ class MeldTool(ToolFix):
         super().__init__(hub, group)
         if hub.domain.dimension != 3:
             raise ScriptError("this tool is for 3D", expected="a domain in 3D")
-        self.numbers = (K, half_width, c1, c2, theta, lo, hi, Rmax)
-        self.now(*self.numbers)  # raises an error for formulas of position
-        self.along = "xyz".index(axis)
-        self.across = [k for k in range(3) if k != self.along]
-
-    def _seen(self, points: Any, *at: float) -> tuple[np.ndarray, ...]:
-        """Return heights (n,) above the end, positions (n, 2) in fixed and tool axes, rotation."""
-        c1, c2, theta, lo = at
-        x = points.position.astype(float)
-        q = x[:, self.across] - np.array([c1, c2])
-        turn = np.array([[np.cos(theta), np.sin(theta)], [-np.sin(theta), np.cos(theta)]])
-        return x[:, self.along] - lo, q, q @ turn.T, turn
-
-    def depth_of(self, points: PointTable) -> np.ndarray:
-        _, w, c1, c2, theta, lo, hi, Rmax = self.now(*self.numbers)
-        height, q, rotated, _ = self._seen(points, c1, c2, theta, lo)
-        ways = (
-            height,
-            hi - lo - height,
-            Rmax - np.linalg.norm(q, axis=1),
-            abs(rotated).max(axis=1) - w,
-        )
-        return np.min(ways, axis=0)
-
-    def forces(self, points: PointsView) -> np.ndarray:
-        K, w, c1, c2, theta, lo, hi, Rmax = self.now(*self.numbers)
-        height, q, rotated, turn = self._seen(points, c1, c2, theta, lo)
-        r = np.linalg.norm(q, axis=1)
-        inward = (np.clip(rotated, -w, w) - rotated) @ turn
-        outward = q * np.divide(Rmax - r, r, out=np.zeros_like(r), where=r > 0)[:, None]
-        # Ways out (n, 3) into the channel, radially and below; and their lengths.
-        ways = np.zeros((3, len(r), 3))
-        ways[0][:, self.across] = inward
-        ways[1][:, self.across] = outward
-        ways[2][:, self.along] = -height
-        shortest = np.linalg.norm(ways, axis=2).argmin(axis=0)
-        inside = (height >= 0) & (height <= hi - lo) & (r <= Rmax)
-        way = ways[shortest, np.arange(len(r))] * inside[:, None]
-        return (K * self.stiffness(points))[:, None] * way
+        self.shape = Channel("xyz".index(axis))
+        self.push(self.by_modulus(), K, half_width, c1, c2, theta, lo, hi, Rmax)
