@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 from scenes import block
+from selection import parameters
 
 # Points of the block: squares (cubes) of side 0.05, rho = 2, G = 100/(2*1.3).
 SIDE, RHO, G, DT = 0.05, 2.0, 100 / 2.6, 0.001
@@ -177,6 +178,36 @@ def test_traction(run_interpreted, d):
         expected[end, 1] = 3 * size
         assert force[:, 1].sum() == pytest.approx(3 * 0.2 * (0.1 if d == 3 else 1), rel=1e-5)
     assert force == given(expected)
+
+
+@pytest.mark.parametrize(
+    ("d", "tools"),
+    parameters(
+        [
+            (
+                2,
+                [
+                    "indent, all, sphere, 500, 0.13, 0.45, 0.55 - time, 0",
+                    "indent/minimize_penetration, all, sphere, 0.1, 0.3, 0.54, 0, 1, 0, 0, 0.3",
+                    "contact/minimize_penetration/plane, body, 0, 0.3001, 0, 0, 1 + time, 0, 0.3",
+                    "impenetrablesurface, all, 0.5, 0.42, 0.35, 0, 3, 4, 0",
+                    "cuttingtool, all, 2, 0.4 + time, 0.39, 0, -1, 0, 0, 0.4, 0.6, 0.6, 0.39",
+                    "neumann_bc_mech, all, -7*(1 + x), 3",
+                ],
+            )
+        ],
+        [(3, ["meldtool, all, 1, y, 0.03, 0.4, 0.35, 9*time, 0.31, 2, 0.12"])],
+    ),
+)
+def test_compiled_tools_exert_the_same_forces(run_script, run_interpreted, d, tools):
+    fixes = [f"fix(F{k}, {tool})" for k, tool in enumerate(tools)]
+    columns = ", ".join(f"F{k}_{axis}" for k in range(len(tools)) for axis in "xy")
+    lines = [*fixes, "set_dt(0.001)", "set_output(1)", f"log_modify(custom, step, {columns})"]
+    script = block(d, "fix(v, initial_velocity_particles, all, 1, 0, 0)", *lines, "run(3)")
+    compiled, interpreted = [run(script).log for run in (run_script, run_interpreted)]
+    for name in compiled:
+        assert compiled[name] == pytest.approx(interpreted[name], rel=1e-9, abs=1e-9)
+    assert all(np.abs(compiled[name]).max() > 0 for name in compiled if name.endswith("_y"))
 
 
 def test_traction_around_an_axis(run_interpreted):

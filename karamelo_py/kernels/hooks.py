@@ -39,6 +39,7 @@ from karamelo_py.kernels import arrays
 from karamelo_py.kernels.arrays import Index, Tag
 from karamelo_py.kernels.records import put_at
 from karamelo_py.kernels.views import volume_of
+from karamelo_py.points.bodies import face
 
 
 class OneNode(NamedTuple):
@@ -202,6 +203,11 @@ WORDS = {
     "velocity": lambda members, law, state, p: load_vector(members.kin, members.points.v, p),
     "position": lambda members, law, state, p: load_vector(members.kin, members.x, p),
     "volume": lambda members, law, state, p: volume_of(members.kin, members.points, law, state, p),
+    "face": lambda members, law, state, p: face(
+        members.kin,
+        volume_of(members.kin, members.points, law, state, p),
+        load_vector(members.kin, members.x, p),
+    ),
 }
 
 

@@ -9,9 +9,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from karamelo_py.compiler import implements, importable, kernel, point_function
+from karamelo_py.compiler import classes_in, implements, importable, kernel, point_function
 from karamelo_py.compiler.fields import field, increase, load_vector, store
-from karamelo_py.compiler.trace.choices import classes_in
 from karamelo_py.kernels import hooks
 from karamelo_py.kernels.arrays import first_from, vector_at
 from karamelo_py.kernels.equations.internal_force import ContactLoss, Force
@@ -42,7 +41,18 @@ class Channel(NamedTuple):
     upper end, radius.
     """
 
-    axis: int
+    axis = 0
+
+
+class ChannelY(Channel):
+    axis = 1
+
+
+class ChannelZ(Channel):
+    axis = 2
+
+
+CHANNELS = {"x": Channel, "y": ChannelY, "z": ChannelZ}
 
 
 @point_function()
@@ -100,7 +110,8 @@ def _way_out_channel(shape, kin, values, x):
     places = {first: 0, second: 1, shape.axis: 2}
     out = vector(kin, [shortest[places[k]] for k in range(3)])
     size = sqrt(square)
-    return (size if depth > 0 else depth), (1 / size if size > 0 else 0.0) * out
+    depth = size if depth > 0 else depth
+    return depth, (1 / size if size > 0 else 0.0) * out
 
 
 class PushedPoint(NamedTuple):

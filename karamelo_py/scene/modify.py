@@ -101,7 +101,7 @@ class Fix(Publisher):
 
     group: Any = None
     formulas: tuple = ()  # for compiled hooks: one formula or None per component
-    numbers: tuple = ()  # formulas of time of a tool with a compiled hook
+    values_of_time: tuple = ()  # further formulas of a compiled hook, of time alone
     components: tuple = ()  # for a force in Python: a formula or None per direction
     first_step_only = False  # acts only in the first step after its definition
     # True: Python hooks treat each point or node separately and move none. Hooks then get the

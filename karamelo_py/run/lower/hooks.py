@@ -126,7 +126,8 @@ class _Builder:
             slot = self.hub.values.slot(f"{fix.id}_{first}")
         if hook.tag is not None:
             address = arrays.WHOLE
-            self.whole.append(hook.tag(len(self.rows), (1,) * len(fix.formulas + fix.numbers)))
+            values = (1,) * len(fix.formulas + fix.values_of_time)
+            self.whole.append(hook.tag(len(self.rows), values))
         else:
             with as_script_error(f"fix {fix.style}", moment, hook.function, fix.mark):
                 address = address_of(hook.function, hook.signature)
@@ -146,7 +147,7 @@ class _Builder:
         formulas_of_hook = (Expression(0.0) if f is None and whole else f for f in fix.formulas)
         programs = list(map(self.formulas.add, formulas_of_hook))
         programs += [NO_PROGRAM] * (FRICTION - len(programs))
-        programs += map(self.formulas.add, (fix.wall_friction, *fix.numbers))
+        programs += map(self.formulas.add, (fix.wall_friction, *fix.values_of_time))
         self.programs.append(programs)
         self.uses_first |= not hook.on_nodes and any(f.names & FIRST for f in formulas)
         if hook.holds and hook.on_nodes:

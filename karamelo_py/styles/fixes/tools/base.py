@@ -30,6 +30,9 @@ from karamelo_py.script.expressions import Expression
 from karamelo_py.styles.fixes.forces import PointForces
 
 
+OF_SHAPE = 2e-8  # core seconds per point and step
+
+
 class ToolFix(PointForces):
     """Base of fixes that push points; points are small cubes (in 2D squares)."""
 
@@ -89,7 +92,7 @@ def begin_behind(plane: Any, scene: Any) -> Any:
 
 
 class ShapedTool(ToolFix):
-    """Base of tools with a `shape`, whose values are the last of `numbers`."""
+    """Base of tools with a `shape`, whose values are the last of `values_of_time`."""
 
     kind_of_press: type[Press] = Press
     grip: type | None = None
@@ -99,7 +102,7 @@ class ShapedTool(ToolFix):
 
     def push(self, law: Any, *numbers: Expression) -> None:
         """Set the law of the force, and its value, if any, and those of the shape."""
-        self.law, self.numbers, self.first = law, numbers, 0 if isinstance(law, Stiff) else 1
+        self.law, self.values_of_time, self.first = law, numbers, 0 if isinstance(law, Stiff) else 1
         self.now(*numbers)  # raises ScriptError for formulas of position
         self.initial_integrate = press_hook(self._press)
 
@@ -112,10 +115,13 @@ class ShapedTool(ToolFix):
     def _press(self, row: int, values: tuple) -> Press:
         return press_kind(self.kind_of_press, self.grip)(row, values, self.shape, self.law)
 
+    def seconds(self) -> float:
+        return super().seconds() + OF_SHAPE * len(self.group)
+
     def depth_of(self, points: PointTable) -> np.ndarray:
         x, kin = points.position.astype(float), self.hub.domain.kin
         depths = np.empty(len(x))
-        values = tuple(self.now(*self.numbers[self.first :]).tolist())
+        values = tuple(self.now(*self.values_of_time[self.first :]).tolist())
         find_depths(kin, self.shape, values, x, depths)
         return depths
 
@@ -124,7 +130,7 @@ class ShapedTool(ToolFix):
         x, force = points.position.astype(float), np.empty(points.position.shape)
         modulus = self.stiffness(points) if isinstance(self.law, ByModulus) else np.zeros(len(x))
         seen = PushedPoint(x, points.mass.astype(float), self.side(points), modulus)
-        tag, values = self._press(0, ()), tuple(self.now(*self.numbers).tolist())
+        tag, values = self._press(0, ()), tuple(self.now(*self.values_of_time).tolist())
         push_points(self.hub.domain.kin, tag, values, seen, force)
         return force
 

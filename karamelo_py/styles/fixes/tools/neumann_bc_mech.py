@@ -2,6 +2,8 @@
 
 import numpy as np
 
+from karamelo_py.kernels.equations.internal_force import Force
+from karamelo_py.kernels.hooks import vector_hook
 from karamelo_py.scene.group import ParticleGroup
 from karamelo_py.scene.hub import Hub
 from karamelo_py.scene.modify import per_direction
@@ -9,6 +11,13 @@ from karamelo_py.scene.views import PointsView
 from karamelo_py.script.expressions import Expression
 from karamelo_py.styles.fixes.formulas import vector
 from karamelo_py.styles.fixes.tools.base import ToolFix
+
+
+def pull(area, force, values, dt):
+    """Add the traction times the area of a face."""
+    load = [area * value for value in values]
+    both = zip(force, (*load, *(0.0,) * (len(force) - len(load))), strict=True)
+    return force._make([a + b for a, b in both]), tuple(load)
 
 
 class NeumannBcMech(ToolFix):
@@ -41,10 +50,13 @@ class NeumannBcMech(ToolFix):
     syntax = "group, tx[, ty[, tz]]"
     presses = False
 
+    initial_integrate = vector_hook(pull, reads=("face", Force), writes=(Force,), publishes=True)
+
     def __init__(self, hub: Hub, group: ParticleGroup, *traction: Expression | None):
         super().__init__(hub, group)
-        self.traction = per_direction(hub, "t", traction)
+        self.formulas = per_direction(hub, "t", traction)
 
     def forces(self, points: PointsView) -> np.ndarray:
+        """Return the forces (n, d) in load steps."""
         x, first = points.position.astype(float), lambda: points.reference_position
-        return self.face(points)[:, None] * vector(self.traction, self.hub, x, first)
+        return self.face(points)[:, None] * vector(self.formulas, self.hub, x, first)
