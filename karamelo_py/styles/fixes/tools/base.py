@@ -29,7 +29,6 @@ from karamelo_py.script.errors import ScriptError
 from karamelo_py.script.expressions import Expression
 from karamelo_py.styles.fixes.forces import PointForces
 
-
 OF_SHAPE = 2e-8  # core seconds per point and step
 
 
