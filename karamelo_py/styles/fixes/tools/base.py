@@ -8,7 +8,7 @@ import numpy as np
 from karamelo_py.kernels.tools import (
     Ball,
     ByModulus,
-    Plane,
+    HalfSpace,
     Press,
     PushedPoint,
     Stiff,
@@ -100,7 +100,7 @@ class ShapedTool(ToolFix):
     first = 0  # index of the first value of the shape
 
     def push(self, law: Any, *numbers: Expression) -> None:
-        """Set the law of the force, and its value, if any, and those of the shape."""
+        """Set the law of the force, and the values of the law, if any, and of the shape."""
         self.law, self.values_of_time, self.first = law, numbers, 0 if isinstance(law, Stiff) else 1
         self.now(*numbers)  # raises ScriptError for formulas of position
         self.initial_integrate = press_hook(self._press)
@@ -137,7 +137,7 @@ class ShapedTool(ToolFix):
 class PlaneTool(ShapedTool):
     """Base of tools with a plane. Points belong on the side to which the normal points."""
 
-    shape = Plane()
+    shape = HalfSpace()
 
     def lay(self, origin: Sequence[Expression], normal: Sequence[Expression]) -> tuple:
         """Return the formulas of the shape."""
