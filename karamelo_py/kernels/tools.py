@@ -22,7 +22,7 @@ from karamelo_py.points.laws import can, damage, defined_by
 CLOSE = 0.5  # distance in radii within which a bouncing point retains its friction spring
 
 
-class HalfSpace(NamedTuple):
+class FlatSide(NamedTuple):
     """Values: a position (d,), and the normal (d,) towards the side of the points."""
 
 
@@ -60,7 +60,7 @@ def way_out(shape, kin, values, x):
     """Return the depth of `x` in a shape, negative outside, and the unit direction out (d,)."""
 
 
-@way_out.on(HalfSpace)
+@way_out.on(FlatSide)
 def _way_out_plane(shape, kin, values, x):
     normal = x._make(values[kin.dimension : 2 * kin.dimension])
     normal = 1 / sqrt(normal.squared()) * normal

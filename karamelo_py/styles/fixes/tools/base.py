@@ -8,7 +8,7 @@ import numpy as np
 from karamelo_py.kernels.tools import (
     Ball,
     ByModulus,
-    HalfSpace,
+    FlatSide,
     Press,
     PushedPoint,
     Stiff,
@@ -137,7 +137,7 @@ class ShapedTool(ToolFix):
 class PlaneTool(ShapedTool):
     """Base of tools with a plane. Points belong on the side to which the normal points."""
 
-    shape = HalfSpace()
+    shape = FlatSide()
 
     def lay(self, origin: Sequence[Expression], normal: Sequence[Expression]) -> tuple:
         """Return the formulas of the shape."""
