@@ -13,7 +13,8 @@ from karamelo_py.compiler import classes_in, implements, importable, kernel, poi
 from karamelo_py.compiler.fields import field, increase, load_vector, store
 from karamelo_py.kernels import hooks
 from karamelo_py.kernels.arrays import first_from, vector_at
-from karamelo_py.kernels.equations.internal_force import ContactLoss, Force
+from karamelo_py.kernels.equations.internal_force import ContactLoss
+from karamelo_py.kernels.touching import written_force
 from karamelo_py.kernels.views import volume_of
 from karamelo_py.points.bodies import FrictionMemory, along, face, radius, rub
 from karamelo_py.points.kinematics import dot, vector, zero_vector
@@ -211,6 +212,9 @@ class Press(NamedTuple):
     ahead = False
 
 
+hooks.written.on(Press)(written_force)
+
+
 class PressSquare(Press):
     """Also publishes the number of points that are pushed."""
 
@@ -313,14 +317,6 @@ def _press_stiffly(tag, members, one, point):
     store(grip, one.p, (*after.hold, after.mean, after.unused, *point.x))
     increase(field(members.points.fields, ContactLoss), one.p, (kick * dot(rubbed, slip),))
     return force + rubbed
-
-
-@hooks.written.on(Press)
-def _written_of_press(tag, members, p, values):
-    force = field(members.points.fields, Force)
-    for c in range(members.kin.dimension):
-        force[c, p] += values[c]
-    return tuple(values)
 
 
 def press_kind(base: type, grip: type | None) -> type[Press]:

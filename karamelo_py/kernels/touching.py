@@ -221,7 +221,7 @@ def _results_of_touch(tag, members, one):
 
 
 @hooks.written.on(Touch)
-def _written_of_touch(tag, members, p, values):
+def written_force(tag, members, p, values):
     force = field(members.points.fields, Force)
     for c in range(members.kin.dimension):
         force[c, p] += values[c]
