@@ -97,7 +97,7 @@ class RelativeVelocity(Field):
 
 
 class VolumeStrain(Field):
-    """Volume strain and, with splines, the unseen strain and pressure of the previous step."""
+    """Strain of the water, its unseen part in the previous step, and recent inflow (splines)."""
 
     shape = numbers(3, 0)
     needed = RelativeVelocity.needed
@@ -123,7 +123,7 @@ class WaterSums(SummedField):
     """Nodal sums of water and pores.
 
     Mass, relative momentum and force of the water, as in `Nodes.sums`, with a column for the drag
-    and, in 2D, for volume times unseen strain and pressure; volume, volume of pores, volume times
+    and, in 2D, for volume times unseen strain and inflow; volume, volume of pores, volume times
     pressure, volume times strain; force of the pressure (d,) and outward area (d,).
     """
 
@@ -148,13 +148,13 @@ class WaterUpdate(StepField):
 
 
 class Flux(Field):
-    """Mass flux (d,) per area, outflow per volume, four means, mass outflow through open nodes.
+    """Mass flux (d,) per area, outflow per volume, three means, mass outflow through open nodes.
 
     The outflow per unit volume is computed for closed nodes and does not leave the points; the mass
-    outflow does. The means are of strain, unseen strain, pressure and unseen pressure.
+    outflow does. The means are of strain, unseen strain and inflow.
     """
 
-    shape = numbers(6, 1)
+    shape = numbers(5, 1)
     filled = True
 
 
@@ -219,7 +219,7 @@ class WetPoint(NamedTuple):
     w: tuple  # velocity of the water relative to the soil
     drag: arrays.Number  # force per unit relative velocity
     volumes: tuple  # of point and pores, times pressure; with splines, times strain, or content
-    unseen: tuple  # products of volume and unseen strain and pressure (splines)
+    unseen: tuple  # products of volume and unseen strain and inflow (splines)
     p: arrays.Number
     area: tuple  # volume times the unit tensor, in the frame of the gradients
 
@@ -359,7 +359,7 @@ class PoreVolumes(eq.ExtensiveQuantity):
 
 
 class UnseenStrain(eq.ExtensiveQuantity):
-    says = "null-space strain and pressure to grid"
+    says = "null-space strain and inflow to grid"
     takes = OF_PORES
     gives = (
         eq.Sum(
@@ -681,7 +681,7 @@ class MakeFlux(NamedTuple):
         flux, d = field(nodes.fields, Flux), kin.dimension
         of_step, across = isinstance(task.velocity, OfStep), real(0, dt)
         if not is_wet_node(nodes, kin, n):
-            put_at(flux, n, 0, (0,) * (d + 6))
+            put_at(flux, n, 0, (0,) * (d + 5))
             if field(nodes.fields, GivenFlux) is not None:
                 put_at(field(nodes.fields, GivenFlux), n, 0, (0,) * (2 * d + 2))
             return
@@ -708,9 +708,9 @@ class MakeFlux(NamedTuple):
         stays = across + supply if closed else supply
         leaves = across + supply if drained else real(0, dt)
         put_at(flux, n, d, (real(0, dt) if drained else stays * per_volume,))
-        flux[n, d + 5] = leaves
+        flux[n, d + 4] = leaves
         if task.rim is not None:  # splines
-            columns = of_V + 3, of_unseen(kin), of_V + 2, of_unseen(kin) + 1
+            columns = of_V + 3, of_unseen(kin), of_unseen(kin) + 1
             put_at(flux, n, d + 1, [water[n, column] * per_volume for column in columns])
         # With the mean relative velocity in the step, the remaining work is the work of weight
         # minus the work of drag, and the work of pressure on water that enters or leaves.
@@ -787,7 +787,7 @@ class Seep(eq.Task):
         spread = none if w.frame.moves else tensor
         if by_cells(w):
             return spread, none, (), tensor if isinstance(w.basis, Linear) else (none,)
-        return spread, none, (none,) * 4, ()  # `Strain` gathers the gradient
+        return spread, none, (none,) * 3, ()  # `Strain` gathers the gradient
 
     def gathered(task, node, total):
         if not isinstance(node.w.laws, Saturated):
@@ -812,8 +812,8 @@ class Seep(eq.Task):
         leaving = spread
         if not frame.moves:
             leaving = trace(spatial_increment(frame, kin, spread, f))
-        jacobian = laws.jacobian(law, kin, old)
-        content = old.content - pt.dt * jacobian * (leaving - kept)
+        jacobian, inflow = laws.jacobian(law, kin, old), -pt.dt * (leaving - kept)
+        content = old.content + jacobian * inflow
 
         def growth(gradient):
             return det(I + spatial_increment(frame, kin, increment(pt.dt, gradient), f))
@@ -829,16 +829,16 @@ class Seep(eq.Task):
         # Initial stresses change J but not the pores.
         pores = old.pores + jacobian * (grown - 1)
         if len(means):
-            mean, again, p, p_again = means
-            strain, unseen, p_unseen = pt.load(VolumeStrain, (mean,) * 3)
-            change, n = real(SMOOTHING, mean) * (again - unseen), porosity(law, kin, old)
-            b = pt.dt * drag_at(law.permeability, law, n) / (n * law.rho)
-            pores = pores + change * jacobian * grown
-            pores = pores * (1 + SMOOTHING / (1 + b) / law.K * (p_unseen - p_again))
+            mean, again, mean_recent = means
+            strain, unseen, recent = pt.load(VolumeStrain, (mean,) * 3)
+            change = real(SMOOTHING, mean) * (again - unseen)
+            further = real(SMOOTHING, mean) * (mean_recent - recent)
+            pores, content = pores + change * jacobian * grown, content + jacobian * further
             store(pt.of(VolumeCorrection), pt.p, (change,))
-            later = strain + (1 + strain) * (grown * (1 + change) - 1)
-            p_unseen = pore_pressure(law, kin, old) - p
-            store(pt.of(VolumeStrain), pt.p, (later, strain - mean, p_unseen))
+            later = strain * (1 - SMOOTHING * law.fades)
+            later = later + (grown - 1) + change - (inflow + further) / law.rho
+            recent = (1 - SMOOTHING) * recent + inflow
+            store(pt.of(VolumeStrain), pt.p, (later, strain - mean, recent))
         new = old._replace(content=content, pores=pores)
         store_from(pt.w.points.state, pt.p, count_in(old.skeleton), new)
         v = pt.v

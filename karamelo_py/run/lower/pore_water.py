@@ -27,6 +27,11 @@ RESTRICTIONS = Restrictions(
 )  # fmt: skip
 
 
+def oedometric_modulus(law: NamedTuple) -> float:
+    kin = Space()
+    return float(wave_speed_squared(law, kin, initial_state(law, kin, 1.0)) / specific_volume(law))
+
+
 class PoreWater(NamedTuple):
     tag, tag_in_load_steps, tag_of_solution = rows.Water(), rows.SlowWater(), rows.SolvedWater()
     node_fields = rows.Water.node_fields
@@ -63,7 +68,8 @@ class PoreWater(NamedTuple):
 
     def around(self, law: NamedTuple) -> NamedTuple:
         solved = self.update.scheme.traits.solves_pressure
-        return Saturated(law, *self[:-1], K_of_waves=0.0 if solved else self.K)
+        fades = min(1.0, (oedometric_modulus(law) / (2 * self.stiffness)) ** 2)
+        return Saturated(law, *self[:-1], K_of_waves=0.0 if solved else self.K, fades=fades)
 
     @property
     def stiffness(self) -> float:
@@ -74,8 +80,7 @@ class PoreWater(NamedTuple):
 
     def time_scale(self, solid: Solid, duration: float) -> str:
         """Describe the drainage of a solid along its shortest side in a time `duration`."""
-        law, kin = solid.material.whole, Space()
-        M = wave_speed_squared(law, kin, initial_state(law, kin, 1.0)) / specific_volume(law)
+        M = oedometric_modulus(solid.material.whole)
         consolidation = M * self.stiffness / (M + self.stiffness) / self.drag
         side = min((solid.hi - solid.lo)[: solid.domain.dimension])
         Tv = consolidation * duration / side**2
