@@ -82,7 +82,7 @@ from karamelo_py.points.laws.pore_water import (
 from karamelo_py.points.transfers import nodal_momentum, updated_velocity
 
 RIM = 0.5  # |B| / (V / h) above which a spline's node is at the surface
-SMOOTHING = 0.2  # R
+SMOOTHING = 0.3  # R
 WAYS = "xlo", "xhi", "ylo", "yhi", "zlo", "zhi", "surface", "volume"
 SMALL = 1e-4  # below this b, (1 - exp(-b)) / b is a series
 
