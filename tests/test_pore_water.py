@@ -302,14 +302,33 @@ def test_check_says_whether_water_flows_in_time(run_interpreted, Tv, word):
     assert "flux of the water; inflow and outflow of water" in out
 
 
-def test_a_loaded_surface_without_a_drain_needs_a_linear_basis(run_interpreted):
-    """The smoothing of volume strains lets it sink with splines: the energy balance says so."""
-    load = "fix(load, force_nodes, top, -1e4)\nrun(130)"
-    splines = (COLUMN + load).replace("tlmpm, FLIP, linear", "ulmpm, FLIP, quadratic-spline")
-    err = run_interpreted(splines, "-var", "N", "4").err
-    assert "pore water and splines in explicit steps" in err
-    assert "fix: linear, or scheme(semi-implicit)" in err
-    assert "energy balance" not in run_interpreted(COLUMN + load, "-var", "N", "4").err
+@same_kernels
+@pytest.mark.parametrize("drained", [False, True])
+def test_splines_let_no_surface_creep(run_script, drained):
+    """Terzaghi 1923, and the undrained modulus M + K/n, at the point next to a loaded surface."""
+    k, z, M, load = 1e-3 if drained else 1e-2, 1 / 32, 1e7, 1000
+    drain = """
+        fix(drain, pore_pressure, top, 0)
+        fix(start, initial_pore_pressure, all, 1000)
+    """
+    text = COLUMN.replace("tlmpm, FLIP, linear", "ulmpm, FLIP, quadratic-spline") + f"""
+        fix(load, force_nodes, top, -{load})
+        {drain if drained else ""}
+        fix(u, displacement, all)
+        compute(u, probe, all, ux, x=1)
+        set_output(10000)
+        log_modify(custom, step, u)
+        run_time({0.1 if drained else 0.2})
+    """
+    result = run_script(text.replace("=1e-2)", f"={k})"), "-var", "N", "8")
+    stiff = M + 2.2e9 / 0.4
+    left = 0.0
+    if drained:
+        T, way = k / 9810 * M * (stiff - M) / stiff * 0.1, pi * (np.arange(400) + 0.5)
+        left = np.sum(2 / way**2 * np.cos(way * z) * np.exp(-way * way * T))
+    exact = -load / (M if drained else stiff) * (1 - z - left)
+    assert last(result)["u"] == pytest.approx(exact, rel=0.05 if drained else 0.01)
+    assert "spurious gain" not in result.err
 
 
 @same_kernels
@@ -641,6 +660,13 @@ def test_a_permeability_in_the_wrong_unit_is_doubted(run_interpreted):
     script = SCENE.format(**USUAL | {"water": "pore_water(clay, n=0.4, permeability=1e-14)"})
     err = run_interpreted(script).err
     assert re.search(r"conductivity is 1e-14 m/s.*\n(.*\n)*.*intrinsic=", err)
+
+
+def test_water_a_million_times_too_soft_is_doubted(run_interpreted):
+    water = "pore_water(clay, n=0.4, permeability=1e-3, K=2.2)"
+    err = run_interpreted(SCENE.format(**USUAL | {"water": water})).err
+    assert "water with K = 2.2 is 5.5e+06 times softer than the soil 'clay'" in err
+    assert "hint: K=2.2e9 for water, in Pa" in err
 
 
 def test_the_density_of_saturated_soil_is_doubted(run_interpreted):

@@ -77,7 +77,7 @@ CHOICES = (
         lambda s: s.wet and s.elastic_only and s.alone,
         ("method(tlmpm, FLIP, linear, 1)",),
         "elastic soil with pore water",
-        "points stay in their cells, and loaded surfaces without a drain do not sink",
+        "points stay in their cells, and pressures are not smoothed",
         ("in.terzaghi",),
     ),
     Choice(

@@ -17,8 +17,7 @@ from karamelo_py.scene.hub import Hub
 LOSS = 0.05  # lost fraction for a warning at the end of a run; WITHIN: before the end
 LEAST = 5e-4  # fraction of the largest energy below which losses by contact are not shown
 WATER = (
-    "pore water and splines in explicit steps, above all at loaded surfaces without fix "
-    "pore_pressure",
+    "pore pressures that change within a cell, which explicit steps with splines smooth",
     "linear, or scheme(semi-implicit)",
 )
 WHOLE = "more points per cell, a finer grid, cpgimp or ulcpdi, or method tlmpm"

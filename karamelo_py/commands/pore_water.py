@@ -5,13 +5,14 @@ from typing import Annotated
 from karamelo_py.language.signature import Positive
 from karamelo_py.points.laws import is_rigid, specific_volume
 from karamelo_py.points.laws.pore_water import ConstantPermeability, KozenyCarman
-from karamelo_py.run.lower.pore_water import PoreWater
+from karamelo_py.run.lower.pore_water import PoreWater, oedometric_modulus
 from karamelo_py.scene.hub import Hub
 from karamelo_py.scene.material import Material
 from karamelo_py.script.errors import ScriptError
 
 LEAST, MOST = 0.01, 0.9
 HEAVIEST = 3.2  # density of grains / density of water; in soils it is 2.6 to 2.8
+SOFTEST = 1e-4  # bulk modulus of the water / oedometric modulus of the soil
 SLOWEST, FASTEST = 1e-13, 10.0  # conductivities in m/s
 
 
@@ -78,10 +79,10 @@ def pore_water(
 
     The stable step is set by the fast compression wave (about 1850 m/s in water-saturated soil),
     not by the drag. With N cells along a drainage path of length L, consolidation to Tv = 1 takes
-    about 2 N L c/c_v steps, where c is the wave speed and c_v the coefficient of consolidation.
-    With scheme(semi-implicit), c is the wave speed of the dry soil. If too many steps are needed,
-    as at 1e-9 m/s, use scheme(quasi-static), or multiply the densities by a factor, as in
-    inputs/in.terzaghi.
+    about 1.1 N L c/c_v steps, where c is the wave speed and c_v the coefficient of consolidation.
+    With scheme(semi-implicit), it takes 1.2 N L c/c_v steps with the wave speed c of the dry soil.
+    If too many steps are needed, as at 1e-9 m/s, use scheme(quasi-static), or multiply the
+    densities by a factor, as in inputs/in.terzaghi.
 
     Use this command before the first solid of the material. It needs method ulmpm or tlmpm with
     FLIP or PIC and linear, quadratic-spline or cubic-spline, scheme musl, semi-implicit or
@@ -140,6 +141,13 @@ def pore_water(
             f"the grains of '{material.id}' would be {grains:.2g} times as dense as water: "
             f"density {dry:g} divided by 1 - n",
             hint="a material takes the dry density, (1 - n) times the density of its grains",
+        )
+    M = oedometric_modulus(material.whole)
+    if K < SOFTEST * M:
+        hub.warn(
+            f"water with K = {K:g} is {M / K:.2g} times softer than the soil '{material.id}', and "
+            "would carry no load",
+            hint="K=2.2e9 for water, in Pa",
         )
     k = KozenyCarman() if kozeny else ConstantPermeability()
     suction = K if suction is None else suction

@@ -9,11 +9,17 @@ nodes that are not open.
 
 The flux is j = m / V (v_w - v_s) at nodes. Pressure rate and force use the same gradients: with a
 linear basis at the cell centre (one pressure rate per cell), otherwise at the points; if pressures
-are solved for, by cells with any basis (:mod:`~.pore_cells`). In explicit steps with splines,
-volume strains e and pressures p in the null space of the grid would grow. Therefore in each step R
-(1 - S)^2 e is subtracted from e, in soil and pores, where R = 1/5 and S maps to the nodes and back,
-and R / (1 + b) (1 - S)^2 p from p, in pores only, with b as below. At edges S does not reproduce a
-linear pressure. The flow of water restores it; undrained soil (large b) follows e alone.
+are solved for, by cells with any basis (:mod:`~.pore_cells`).
+
+In explicit steps with splines, strains and pressures in the null space of the grid would grow. S
+maps a quantity to the nodes and back, and is symmetric in the product weighted by volumes. In each
+step R (1 - S)^2 x is subtracted from the volume strain of soil and pores, where R = 0.3 and x is
+the strain of the water: the sum of volume strains minus the volume of inflows. In consolidation the
+soil strains as water leaves, x remains small, and smoothing does not let the soil creep where its
+strain jumps. If the water is softer than the soil, x is as large as the strain of the soil. Hence x
+decays by the fraction R `fades` per step. R (1 - S) y is subtracted from the content, where y is
+the sum of inflows that decays by the fraction R per step: an inflow is smoothed once. The sums of
+volume and water do not change.
 
 Velocities of nodes are means by the mass of soil and water, relative velocities of the water by its
 mass. Hence undrained points have no flux, also if their water contents differ, and the momentum of
@@ -97,7 +103,7 @@ class RelativeVelocity(Field):
 
 
 class VolumeStrain(Field):
-    """Strain of the water, its unseen part in the previous step, and recent inflow (splines)."""
+    """Strain x of the water, (1 - S) x of the previous step, and recent inflow y (splines)."""
 
     shape = numbers(3, 0)
     needed = RelativeVelocity.needed

@@ -28,6 +28,7 @@ RESTRICTIONS = Restrictions(
 
 
 def oedometric_modulus(law: NamedTuple) -> float:
+    """Return the modulus M of an undeformed law, which is c^2 times its density."""
     kin = Space()
     return float(wave_speed_squared(law, kin, initial_state(law, kin, 1.0)) / specific_volume(law))
 
