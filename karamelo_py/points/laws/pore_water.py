@@ -34,7 +34,7 @@ class Saturated(NamedTuple):
     permeability: Any  # tag of a dependence on porosity
     suction: float  # suction at which the saturation is 1/e; K: pores remain full
     K_of_waves: float  # K, or 0 if the pressure is solved for and does not limit the step
-    fades: float  # min(1, (M n / (2 K))^2), with the oedometric modulus M of the skeleton
+    fades: float  # min(1, (M n / (2 K))^4), with the oedometric modulus M of the skeleton
 
     in_lanes = True
 

@@ -69,7 +69,7 @@ class PoreWater(NamedTuple):
 
     def around(self, law: NamedTuple) -> NamedTuple:
         solved = self.update.scheme.traits.solves_pressure
-        fades = min(1.0, (oedometric_modulus(law) / (2 * self.stiffness)) ** 2)
+        fades = min(1.0, (oedometric_modulus(law) / (2 * self.stiffness)) ** 4)
         return Saturated(law, *self[:-1], K_of_waves=0.0 if solved else self.K, fades=fades)
 
     @property
