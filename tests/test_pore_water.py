@@ -311,7 +311,9 @@ def test_splines_let_no_surface_creep(run_script, drained):
         fix(drain, pore_pressure, top, 0)
         fix(start, initial_pore_pressure, all, 1000)
     """
-    text = COLUMN.replace("tlmpm, FLIP, linear", "ulmpm, FLIP, quadratic-spline") + f"""
+    text = (
+        COLUMN.replace("tlmpm, FLIP, linear", "ulmpm, FLIP, quadratic-spline")
+        + f"""
         fix(load, force_nodes, top, -{load})
         {drain if drained else ""}
         fix(u, displacement, all)
@@ -320,6 +322,7 @@ def test_splines_let_no_surface_creep(run_script, drained):
         log_modify(custom, step, u)
         run_time({0.1 if drained else 0.2})
     """
+    )
     result = run_script(text.replace("=1e-2)", f"={k})"), "-var", "N", "8")
     stiff = M + 2.2e9 / 0.4
     left = 0.0
@@ -660,6 +663,18 @@ def test_a_permeability_in_the_wrong_unit_is_doubted(run_interpreted):
     script = SCENE.format(**USUAL | {"water": "pore_water(clay, n=0.4, permeability=1e-14)"})
     err = run_interpreted(script).err
     assert re.search(r"conductivity is 1e-14 m/s.*\n(.*\n)*.*intrinsic=", err)
+
+
+def test_forces_on_nodes_beyond_a_surface_are_doubted(run_interpreted):
+    """Splines reach beyond it in ulmpm; in tlmpm the grid ends at the body."""
+    load = (
+        COLUMN.replace("0, 1, 1/N)", "0, 1 + 1/N, 1/N)", 1) + "fix(f, force_nodes, top, -1)\nrun(1)"
+    )
+    splines = load.replace("tlmpm, FLIP, linear", "ulmpm, FLIP, quadratic-spline")
+    words = "1 of 2 nodes lie beyond the surface"
+    assert words in run_interpreted(splines, "-var", "N", "4").err
+    for other in (splines.replace("ulmpm", "tlmpm"), splines.replace("1 + 1/N", "1")):
+        assert words not in run_interpreted(other, "-var", "N", "4").err
 
 
 def test_water_a_million_times_too_soft_is_doubted(run_interpreted):

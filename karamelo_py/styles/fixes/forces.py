@@ -11,6 +11,7 @@ from karamelo_py.kernels.equations.twist import MassTimesRadius, SumsAround, Tor
 from karamelo_py.kernels.laws import law_on
 from karamelo_py.language.rules import known_failure
 from karamelo_py.language.signature import In
+from karamelo_py.output.node_columns import places_of
 from karamelo_py.output.units import FORCE, Powers
 from karamelo_py.points.kinematics import Space, nothing, tr, zero
 from karamelo_py.points.laws import (
@@ -185,6 +186,33 @@ class ForceNodes(Fix):
             self.formulas = (*rest, applied("*", Expression.seed("x0"), around))
             self.post_particles_to_grid = self.of_twist
             self.node_fields = (TorqueOfLoads, WorkAtNodes)
+
+
+def _beyond_a_surface(fix: ForceNodes, scene: Any) -> dict | None:
+    """Count the nodes of a spline beyond the surface of a body, which have little of its mass."""
+    hub = fix.hub
+    method, domain = hub.update.method, hub.domain
+    if method is None or not method.frame.moves or method.basis.traits.gradient_jumps:
+        return None
+    d, reach = domain.dimension, 1.5 * domain.h
+    x = places_of(hub, fix.group.members)[:, :d]
+    on, near = np.zeros((2, len(x)), bool)
+    for solid in hub.solids.values():
+        lo, hi = solid.lo[:d] - domain.tolerance, solid.hi[:d] + domain.tolerance
+        on |= ((x >= lo) & (x <= hi)).all(axis=1)
+        near |= ((x > lo - reach) & (x < hi + reach)).all(axis=1)
+    count = int(np.count_nonzero(near & ~on))
+    return {"count": count, "all": int(np.count_nonzero(near))} if count and on.any() else None
+
+
+known_failure(
+    ForceNodes,
+    "nodes beyond a surface",
+    when=_beyond_a_surface,
+    reason="{count} of {all} nodes lie beyond the surface of a body, have little of its mass, and "
+    "take as much of the force as others",
+    cure="force_particles or edge_pressure, or a domain that ends at the surface",
+)
 
 
 def torques(x: np.ndarray, force: np.ndarray) -> np.ndarray:
