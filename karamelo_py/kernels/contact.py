@@ -30,7 +30,7 @@ import numpy as np
 
 from karamelo_py.compiler import kernel, noinline, point_function
 from karamelo_py.compiler.fields import Field, field
-from karamelo_py.compiler.threads import shared_out
+from karamelo_py.compiler.threads import add_among, shared_out
 from karamelo_py.compiler.tuples import record
 from karamelo_py.kernels.arrays import (
     DT,
@@ -67,6 +67,7 @@ EDGE = 0.03  # above which a face ends or is round
 FACING = 0.3  # directions with a larger cosine count as the same
 FULL = 1.05  # filled fraction of the cells around a node above which a liquid has no gap
 MEMORY = 100  # steps after a contact in which bodies without a firm surface approach a wall slowly
+FEW = 4  # fields up to which the masses of all of them at a place are looked up
 NOWHERE = -1  # after the last place of a list
 REPEATS = 16  # iterations for more than two fields; each at least halves the remaining approach
 
@@ -103,6 +104,7 @@ class SeparateFields(NamedTuple):
     fluid: np.ndarray  # (F,) bool
     surface: np.ndarray  # (F, k) distance to the surface by mean position, in cells
     places: np.ndarray  # (N,) scratch: nodes where fields meet
+    number: np.ndarray  # (stride, 1) scratch: number of fields at a place, of more than `FEW`
     meeting: np.ndarray  # (F,) int64 scratch: fields that meet
     partners: np.ndarray  # (F,) int64 scratch: contacts of each field
     change: np.ndarray  # (F, k) scratch: velocity changes
@@ -761,6 +763,19 @@ def _bodies(s):
     return Bodies(s.contact, s.kin, s.nodes)
 
 
+@shared_out
+def _clear_numbers(s, k):
+    for n in range(s.spans[k + 1, 0], s.spans[k + 1, 1]):
+        s.contact.number[n % s.contact.stride, 0] = 0
+
+
+@shared_out
+def _count_fields(s, k):
+    for n in range(s.spans[k + 1, 0], s.spans[k + 1, 1]):
+        if s.nodes.sums[n, MASS] > 0:
+            add_among(s.contact.number, n % s.contact.stride, 0, 1)
+
+
 def _listing(begin):
     """Make a loop that lists the places where fields meet, after ``begin(s, n)`` for each node."""
 
@@ -770,7 +785,8 @@ def _listing(begin):
         found = first
         for n in range(first, end):
             begin(s, n)
-            if _is_shared(s.contact, s.nodes, n):
+            some = s.contact.slot.size <= FEW or s.contact.number[n % s.contact.stride, 0] > 1
+            if some and _is_shared(s.contact, s.nodes, n):
                 s.contact.places[found] = n
                 found += 1
         if found < end:
@@ -778,6 +794,9 @@ def _listing(begin):
 
     @kernel
     def loop(s, mode):
+        if s.contact.slot.size > FEW:
+            _clear_numbers(mode, s.spans[0, 0], s)
+            _count_fields(mode, s.spans[0, 0], s)
         list_places(mode, s.spans[0, 0], s)
 
     return loop

@@ -178,6 +178,7 @@ class ULMPMContacts(Method):
             reactions=np.zeros(1 + len(hub.values.array), np.int64),
             forces=np.zeros(1 + len(hub.values.array), np.int64),
             places=np.zeros(nodes, np.int64),
+            number=np.zeros((lattices[0].node_count, 1), np.int64),
             meeting=np.zeros(count, np.int64),
             partners=np.zeros(count, np.int64),
             change=np.zeros((count, unknown)),
