@@ -836,19 +836,43 @@ class ListedPairs(NamedTuple):
     gaps: np.ndarray  # (n,)
 
 
+def has_nodes(contact, spans, r, of):
+    """Return True if range `r` has nodes of field `of`."""
+    return spans[r, 0] // contact.stride <= of <= (spans[r, 1] - 1) // contact.stride
+
+
+def _first_field(contact, nodes, n):
+    """Return the node of the first field that has mass at the place of node `n`, else `n`."""
+    for b in range(n // contact.stride):
+        first = n % contact.stride + b * contact.stride
+        if nodes.sums[first, MASS] > 0:
+            return first
+    return n
+
+
 @kernel
-def list_pairs(bodies, grids, spans, pairs):
-    """Fill `pairs` with the node pairs where two fields meet; return their number."""
+def list_pairs(bodies, grids, spans, pairs, of):
+    """Fill `pairs` with the node pairs where field `of` meets others; return their number.
+
+    With `of` < 0, list the pairs of all fields.
+    """
     contact, kin, nodes = bodies
     count = 0
     for s in range(1, 1 + spans[0, 0]):
-        for first in range(spans[s, 0], spans[s, 1]):
+        if of >= 0 and not has_nodes(contact, spans, s, of):
+            continue
+        for one in range(spans[s, 0], spans[s, 1]):
+            if of >= 0 and one // contact.stride != of:
+                continue
+            first = _first_field(contact, nodes, one) if of >= 0 else one
             meeting = _meet(contact, nodes, first)
             node = first % contact.stride
             grid = record(grids, first // contact.stride)
             where = Where(node, node_position(grid, first), grid.h, 1.0, 0)
             for i in range(meeting if meeting > 1 else 0):
                 for j in range(i + 1, meeting):
+                    if of >= 0 and contact.meeting[i] != of and contact.meeting[j] != of:
+                        continue
                     n, m = _node(contact, node, i), _node(contact, node, j)
                     pair = _pair_of(bodies, nodes.update, n, m, False)
                     size = sqrt(dot(pair.outward, pair.outward))

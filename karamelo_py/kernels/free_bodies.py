@@ -11,7 +11,7 @@ from karamelo_py.compiler.threads import shared_out
 from karamelo_py.compiler.tuples import record
 from karamelo_py.kernels import arrays, rigid_links
 from karamelo_py.kernels import rigid_motion as motion
-from karamelo_py.kernels.contact import Bodies, SeparateFields, closing_part, list_pairs
+from karamelo_py.kernels.contact import Bodies, SeparateFields, closing_part, has_nodes, list_pairs
 from karamelo_py.kernels.surfaces import Surface, closest, depth, encloses, place_on, slopes
 from karamelo_py.kernels.table import AtNodes, InThreads, Once, each_node_apart, each_point
 from karamelo_py.kernels.totals import CONTACT_LOSS, WORK, add_to
@@ -327,7 +327,8 @@ def _work_on_points(body, s, block, number, now):
 def _lead_nodes(body, s):
     first = arrays.of_momentum(s.kin)
     for r in range(1, 1 + s.spans[0, 0]):
-        for n in range(s.spans[r, 0], s.spans[r, 1]):
+        reached = has_nodes(s.contact, s.spans, r, body.field)
+        for n in range(s.spans[r, 0], s.spans[r, 1] if reached else 0):
             mass = s.nodes.sums[n, arrays.MASS]
             if n // s.contact.stride == body.field and mass > 0:
                 motion.set_jacobian(body, node_position(record(s.grids, body.field), n))
@@ -340,7 +341,8 @@ def _lead_nodes(body, s):
 def _list_nodes(body, s):
     contact, nodes, d = s.contact, s.nodes, s.kin.dimension
     step = int(s.control.values[arrays.TIMESTEP]) + 1
-    count = list_pairs(Bodies(contact, s.kin, nodes), s.grids, s.spans, body.pairs)
+    at_nodes = Bodies(contact, s.kin, nodes)
+    count = list_pairs(at_nodes, s.grids, s.spans, body.pairs, body.field)
     for q in range(count):
         n, m = body.pairs.nodes[q, 0], body.pairs.nodes[q, 1]
         sign = 1.0

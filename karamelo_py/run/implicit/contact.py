@@ -38,7 +38,7 @@ class Contact:
         pairs, gap = np.zeros((room, 2), np.int64), np.zeros(room)
         normal = np.zeros((room, self.d))
         listed = ListedPairs(pairs, normal, gap)
-        count = list_pairs(Bodies(tag, s.kin, s.nodes), s.grids, s.spans, listed)
+        count = list_pairs(Bodies(tag, s.kin, s.nodes), s.grids, s.spans, listed, -1)
         # Nodes with almost no mass would carry no load.
         shares = self._shares()[equations.number_of(pairs[:count])].min(1)
         chosen = np.flatnonzero(shares >= LIGHT)
