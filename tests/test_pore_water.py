@@ -752,10 +752,9 @@ def test_a_column_at_rest_keeps_its_pore_pressure(run_script, k, method, basis, 
     """Hydrostatic pressure with a free surface above and impermeable walls."""
     log = run_script(REST.format(k=k, method=method, basis=basis, steps=steps)).log
     p = log["p"] / (9810 * (1 - 1 / 64))
-    assert np.abs(p - 1).max() < 0.012
-    # Nodes at walls and surface find their balance first: with cubic splines and k = 1e-6, p at the
-    # base falls from +0.9 % after 32 000 steps to +0.5, +0.4 and +0.4 %.
-    assert np.ptp(p[2:]) < 0.005
+    assert np.abs(p - 1).max() < 0.008
+    # Nodes at walls and surface find their balance first, by 0.3 to 0.6 % of p at the base.
+    assert np.ptp(p[1:]) < 0.003
     assert abs(log["base_y"][-1] / (1990 * 9.81 / 16) - 1) < 1e-3
 
 
