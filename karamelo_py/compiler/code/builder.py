@@ -63,12 +63,19 @@ class Builder(ir.IRBuilder):
         name = "getelementptr inbounds" if inbounds else "getelementptr"
         return self._write(kind, f"{name} {source}, {_typed(pointer, *indices)}")
 
-    def extract_value(self, aggregate: Any, place: int | Sequence[int]) -> Instruction:
-        places = (place,) if isinstance(place, int) else place
-        kind = aggregate.type
-        for k in places:
-            kind = kind.elements[k]
-        return self._write(kind, f"extractvalue {_typed(aggregate)}, {', '.join(map(str, places))}")
+    def extract_value(self, aggregate: Any, place: int | tuple[int, ...]) -> Instruction:
+        """Write an instruction, or find the same one earlier in the block."""
+        made = vars(self._block).setdefault("extracted", {})
+        reference = aggregate.get_reference()
+        key = reference, place, reference[0] != "%" and aggregate.type
+        if key not in made:
+            places = (place,) if isinstance(place, int) else place
+            kind = aggregate.type
+            for k in places:
+                kind = kind.elements[k]
+            numbers = ", ".join(map(str, places))
+            made[key] = self._write(kind, f"extractvalue {aggregate.type} {reference}, {numbers}")
+        return made[key]
 
     def insert_value(self, aggregate: Any, value: Any, place: int) -> Instruction:
         return self._write(aggregate.type, f"insertvalue {_typed(aggregate, value)}, {place}")

@@ -235,6 +235,7 @@ class Lowering:
         def remove() -> None:
             for one, instructions, terminator in ends:
                 one.instructions, one.terminator = [*instructions], terminator
+                one.extracted = {}
             for names, before in kept:
                 names.clear()
                 names.update(_copied(before))
