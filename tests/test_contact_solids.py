@@ -103,7 +103,7 @@ def test_momentum_is_conserved(run_interpreted):
 
 
 MESSAGES = {
-    "method": (("ulmpm",), "needs a separate grid for each solid"),
+    "method": (("ulmpm",), "it needs a separate grid for each solid"),
     "named twice": (("tlmpm", "a, a"), "'a' is named twice"),
     "negative": (("tlmpm", "a, b, -0.1"), "-0.1"),
 }

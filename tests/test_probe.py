@@ -3,6 +3,8 @@
 import numpy as np
 import pytest
 
+from karamelo_py.app.cli import main
+
 SCRIPT = """
     method(ulmpm, FLIP, linear, 1)
     dimension(2, 0, 2, 0, 1, 0.1)
@@ -42,6 +44,12 @@ def test_probe_measures_what_the_dump_holds(run_interpreted):
     assert run.err.count("no point is near") == 2 and "no point is near x=9;" in run.err
     # Before the first step the mean place of a block is its middle.
     assert run.log.b_x[0] == pytest.approx(1.5)
+
+
+def test_check_warns_of_a_probe_outside_all_points(tmp_path, capsys):
+    (tmp_path / "in.x").write_text(SCRIPT)
+    assert main(["check", str(tmp_path / "in.x")]) == 0
+    assert capsys.readouterr().err.count("no point is near") == 2
 
 
 def test_probe_of_what_is_not_there(run_interpreted):

@@ -317,6 +317,63 @@ def test_words_in_each_others_places(run_interpreted, line, told):
     assert not (result.folder / "log.mpm").exists()
 
 
+@pytest.mark.parametrize(
+    ("line", "told"),
+    [
+        ("fix(all, body_force, g, 0, -9)", "hint: fix(g, body_force, all, 0, -9)"),
+        ("group(g)\nfix(v, g, body_force, 0)", "expected: fix(v, body_force, g, ...)"),
+        ("group(g, particles, region, box)", "hint: group(g, particles, region, box, all)"),
+        ("group(g, nodes, solid, body)", "hint: group(g, nodes, region, box, solid, body)"),
+        (
+            "fix(v, velocity_particles, body, 1)",
+            "(body, particles, region, box, solid, body) makes",
+        ),
+        ("fix(c, contact/hertz, body, 0.3)", "expected: one of body"),
+        (
+            "fix(c, contact/hertz, body, body, 0.3)",
+            "contact/minimize_penetration takes a coefficient",
+        ),
+        ('fix(g, body_force, all, 0, "-9*time")', "hint: write formulas without quotes: -9*time"),
+        ('strength(t, tabulated, 1, "0.1;2.5")', "without quotes: 0.1, 2.5"),
+        ("compute(e, energy_balance, all)\nlog_modify(step, e)", "log_modify(custom, step, time"),
+        ("restart(r.*.h5, 10)", "hint: swap r.*.h5 and 10: every 10, file r.*.h5"),
+        ("dump(d, all, grid, 1, d.*, s11)", "hint: dump particle writes s11, a column of points"),
+        ("dump(d, all, pyplot, 1, d.*.png, 9, 9, x, 0)", "hint: the range of colours is vmin=..."),
+        ("scheme(implicit)", "hint: quasi-static, for load steps without inertia"),
+        ("read_restart(none.h5)", "there is no file none.h5"),
+        ("a = ln(5)", "hint: log(x) is the natural logarithm"),
+    ],
+)
+def test_slips_say_what_to_write(run_interpreted, line, told):
+    error = run_interpreted(block(2, *line.split("\n"), "run(1)"), status=1).err
+    assert told in error
+    assert error.count("error: ") == 1 + line.startswith("group(g)")
+
+
+@pytest.mark.parametrize("words", ["ulmpm, linear, FLIP, 1", "FLIP, ulmpm, linear, 1"])
+def test_words_of_a_method_in_each_others_places(run_interpreted, words):
+    error = run_interpreted(f"method({words})", status=1).err
+    assert error.count("error: ") == 1 and "hint: method(ulmpm, FLIP, linear, 1)" in error
+
+
+@pytest.mark.parametrize(
+    ("method", "lines", "told"),
+    [
+        ("tlmpm, PolyPIC/quadratic, linear", "", "tlmpm and the basis linear"),
+        ("ulmpm/contacts, FLIP, linear, 1, mass=corrected", "",
+         "mass=corrected does not support method ulmpm/contacts and transfer FLIP and the basis"),
+        ("ulmpm, FLIP, linear, 1", "scheme(quasi-static)\nprecision(single)\n"
+         "material(soil, linear, 1, 1, 0.3)\npore_water(soil, n=0.4, permeability=1)\n"
+         "region(b, block, 0, 0.2, 0, 0.2)\nsolid(w, region, b, 2, soil, 0.1)",
+         "pore_water and scheme quasi-static do not support precision(single)"),
+    ],
+)  # fmt: skip
+def test_one_wrong_choice_gives_one_message(run_interpreted, method, lines, told):
+    script = block(2, *lines.split("\n"), "run(1)").replace("ulmpm, FLIP, linear, 1", method)
+    error = run_interpreted(script, status=1).err
+    assert told in error and error.count("error: ") == 1
+
+
 def test_what_may_stand_after_a_run(run_interpreted):
     """The form that the log has already; a precision behind an element, which is no run."""
     lines = ["set_output(1, csv)", "run(1)", "set_output(2, csv)", "run(1)"]

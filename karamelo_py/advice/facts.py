@@ -2,7 +2,7 @@
 
 from collections.abc import Iterator
 from functools import cached_property
-from math import pi, sqrt
+from math import inf, pi, sqrt
 from operator import methodcaller
 from typing import Any, NamedTuple
 
@@ -143,7 +143,8 @@ class SceneFacts(BasicFacts):
         """Strain of bodies due to their weight, g L/c^2."""
         sizes = [motion.high - motion.low for motion in self.motions]
         strains = (np.abs(g) * np.max(sizes, axis=0) / self.waves**2 for g in self.weights)
-        return max((float(strain.max()) for strain in strains), default=0.0)
+        # A load may be infinite at the start, such as 1/time.
+        return max((float(strain.max()) for strain in strains if strain.max() < inf), default=0.0)
 
     @cached_property
     def bending(self) -> float:

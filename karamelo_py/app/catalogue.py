@@ -38,9 +38,7 @@ def help_of(family: str, name: str) -> Help:
 
 
 def describe_parameter(parameter: Parameter) -> str:
-    family, text, default = parameter.kind.family, parameter.kind.text, parameter.default
-    if parameter.keyword and parameter.optional and default is None:
-        text = text.removesuffix(" or NULL")
+    family, text, default = parameter.kind.family, parameter.text, parameter.default
     if text == "anything":  # the command or style itself checks the value
         return ""
     parts = ["one of " + ", ".join(registry.names(family)) if family else text]

@@ -9,7 +9,7 @@ from karamelo_py.language.unknown import MEANINGS
 from karamelo_py.scene.group import AnyGroup, ParticleGroup
 from karamelo_py.scene.hub import Hub
 from karamelo_py.scene.plugins import check_fix
-from karamelo_py.script.errors import ScriptError, instead
+from karamelo_py.script.errors import ScriptError
 from karamelo_py.script.expressions import SEEDS, Expression
 from karamelo_py.styles.computes.means import CenterOfMass
 from karamelo_py.styles.fixes.measuring import Measuring
@@ -95,9 +95,9 @@ def delete_compute(hub: Hub, ID: str) -> None:
 
 def _define(hub: Hub, kind: str, ID: str, style: str, arguments: tuple) -> Any:
     catalogue, others = (hub.fixes, hub.computes) if kind == "fix" else (hub.computes, hub.fixes)
-    _refuse_wrong_order(kind, ID, style, arguments)
+    third = (arguments[0].word() if arguments else None) or ""
     with signature.in_new_words(kind, ID, style, arguments):
-        target = registry.called(kind, ID, style)
+        target = registry.called(kind, ID, style, third)
     other = others[ID].published if ID in others else ()
     if set(other) & set(target.published):
         message = f"'{ID}' is a {others.kind} already (line {others[ID].mark.line})"
@@ -127,18 +127,6 @@ def _define(hub: Hub, kind: str, ID: str, style: str, arguments: tuple) -> Any:
     if group is not None and not group.all and len(group) == 0:
         hub.warn(f"{kind} '{ID}' acts on the empty group '{group.id}': it will do nothing")
     return new
-
-
-def _refuse_wrong_order(kind: str, ID: str, style: str, arguments: tuple[Argument, ...]) -> None:
-    if registry.knows(kind, style) or registry.knows(kind, ID):
-        return
-    third = arguments[0].word() if arguments else None
-    if third and registry.knows(kind, third):
-        message = f"'{third}' is a style, and the style comes before the group"
-        expected = f"{kind}({ID}, {third}, {style}, ...)"
-        raise ScriptError(message, mark=arguments[0].mark, expected=expected)
-    if third and instead(kind, third):
-        registry.find(kind, third)  # find() raises an error that suggests a name
 
 
 def _check_names(hub: Hub, kind: str, ID: str, style: type) -> None:

@@ -45,7 +45,8 @@ def method(
         ``Q4``, ``R8``, ``H8``, ``T3`` or ``Tet4``: the domains of the cpdi methods.
     mass
         ``corrected``: remove from the accelerations most of the errors due to mass lumping.
-        Available with APIC, AFLIP, MLS or TPIC and splines. Linear momentum is conserved.
+        Available with APIC, AFLIP, ASFLIP, MLS, TPIC or TFLIP, and splines. Linear momentum is
+        conserved.
 
     Example
     -------
@@ -314,6 +315,11 @@ class _Call:
                 errors.append(error)
         if errors:
             first, *first.others = errors
+            owners = {f: n for n in self.names.values() for f in FAMILIES if registry.knows(f, n)}
+            if len(owners) == len(FAMILIES):
+                words = [owners[family] for family in ("method", "transfer", "basis")]
+                first.hint = f"method({', '.join([*words, *(a.text for a in self.options)])})"
+                first.others = []
             raise first
         return styles
 

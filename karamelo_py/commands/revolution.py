@@ -4,7 +4,7 @@ from karamelo_py.commands.thin import refuse_across, refuse_uneven
 from karamelo_py.points.kinematics import KINEMATICS, Axisymmetric, Cylindrical, Spherical
 from karamelo_py.points.kinematics.twist import Twisted
 from karamelo_py.scene.hub import Hub
-from karamelo_py.script.errors import ScriptError
+from karamelo_py.script.errors import ScriptError, plural
 
 
 def axisymmetric(hub: Hub, active: bool, *, twist: bool = False) -> None:
@@ -97,7 +97,7 @@ def spherical(hub: Hub, active: bool) -> None:
     _set(hub, active, Spherical())
 
 
-SPACES = {1: "one dimension, the radius", 2: "two dimensions, radius and axis"}
+SPACES = {1: "one: the radius", 2: "two: radius and axis"}
 INSTEAD = {1: "cylindrical(true) or spherical(true)", 2: "axisymmetric(true)"}
 
 
@@ -106,7 +106,8 @@ def _set(hub: Hub, active: bool, kin: Axisymmetric | Cylindrical | Spherical) ->
     same = type(domain.kin) is type(kin) if active else isinstance(domain.kin, type(kin))
     written = "axisymmetric(true, twist=true)" if isinstance(kin, Twisted) else f"{name}(true)"
     if active and domain.dimension != d:
-        message = f"{name}: such scenes have {SPACES[d]}, not {domain.dimension}"
+        has = plural(domain.dimension, "dimension")
+        message = f"the domain has {has}, but must have {SPACES[d]}"
         expected = f"dimension({d}, ...) before {written}"
         hint = INSTEAD.get(domain.dimension)
         raise ScriptError(message, argument="active", expected=expected, hint=hint)

@@ -368,7 +368,8 @@ def read_restart(hub: Hub, file: str) -> None:
     --------
     write_restart, restart
     """
-    if hub.rehearsing or hub.checking or hub.interpreter.replay is not None:
+    ahead = hub.rehearsing or hub.checking
+    if hub.interpreter.replay is not None or (ahead and RESTART in hub.output.files.values()):
         return
     if hub.update.method is None or not hub.solids:
         raise ScriptError(
@@ -377,7 +378,9 @@ def read_restart(hub: Hub, file: str) -> None:
     path = Path(file).expanduser()
     ways = [folder / path for folder in hub.interpreter.folders]
     chosen = next((way for way in ways if any(way.parent.glob(way.name))), path)
-    restart_file.Restart(chosen).take(hub, outputs=False)
+    restart = restart_file.Restart(chosen)
+    if not ahead:
+        restart.take(hub, outputs=False)
 
 
 registry.may_differ(set_dt, dt_factor, restart)

@@ -192,6 +192,7 @@ def look_up(catalogue: Any, argument: Argument):
     if word is None:
         article = "an" if catalogue.kind[0] in "aeiou" else "a"
         message = f"'{argument.text}' is not the ID of {article} {catalogue.kind}"
-        raise ScriptError(message, mark=argument.mark)
+        expected = one_of("", catalogue) if catalogue else None
+        raise ScriptError(message, mark=argument.mark, expected=expected)
     with blaming(argument.mark):
         return catalogue[word]

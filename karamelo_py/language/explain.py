@@ -6,7 +6,7 @@ from itertools import pairwise
 
 from karamelo_py.language import registry
 from karamelo_py.language.arguments import NUMBER, Argument, with_gap
-from karamelo_py.language.kinds import Parameter, Unfit
+from karamelo_py.language.kinds import OutputFile, Parameter, Unfit
 from karamelo_py.language.scene import Scene
 from karamelo_py.language.unknown import longer
 from karamelo_py.script.errors import Mark, ScriptError, meant, nearest, table
@@ -39,6 +39,11 @@ def wrong_count(
         before, filled = _filled(needed, arguments, left_out)
         mark, missing = before.mark, _named(left_out, slots)
         hint = hint or (f"{name}({filled})" if filled else None)
+    elif missing and not surplus and not keywords:
+        misfit = next(
+            (a for s, a in zip(needed, arguments, strict=False) if not _fits(s, a.text)), None
+        )
+        mark, hint = misfit and misfit.mark, hint or _completed(name, needed, arguments, misfit)
     message = f"{'one argument' if len(surplus) == 1 else f'{len(surplus)} arguments'} too many"
     if missing:
         message = f"{', '.join(missing)} {'is' if len(missing) == 1 else 'are'} missing"
@@ -47,6 +52,8 @@ def wrong_count(
 
 
 def _of_surplus(text: str, expected: Sequence[Parameter], name: str) -> str | None:
+    if text.startswith("(") and (first := next((p.name for p in expected if p.keyword), None)):
+        return f"{first}={text}"
     words = {word: f"{p.name}={word}" for p in expected if p.keyword for word in p.kind.words}
     word = text if text in words else nearest(text, words)
     return words.get(word or "") or table()["surplus"].get(name)
@@ -66,6 +73,23 @@ def _fits(slot: Parameter, text: str) -> bool:
     if slot.shown != slot.name and slot.kind.text.startswith(("the word ", "one of ")):
         return text in slot.kind.words
     return number_of(text) is None or not slot.kind.text.startswith("the ID of ")
+
+
+def _completed(
+    name: str,
+    slots: Sequence[Parameter],
+    arguments: Sequence[Argument],
+    misfit: Argument | None,
+) -> str | None:
+    words, rest = [argument.text for argument in arguments], slots[len(arguments) :]
+    if misfit is not None:
+        solid = misfit._interpreter.hub.solids.get(words[-1])
+        region = solid.region.id if solid is not None and solid.region else "regionID"
+        form = table()["reordered"].get(f"{name} {misfit.text}")
+        return form and form.format(*words, region=region)
+    if not all(slot.kind.words for slot in rest):
+        return None
+    return f"{name}({', '.join([*words, *(slot.kind.words[0] for slot in rest)])})"
 
 
 def _named(missing: Sequence[Parameter], slots: Sequence[Parameter]) -> list[str]:
@@ -111,6 +135,8 @@ def swapped(
         kind = parameter.kind
         if argument.is_null:
             return kind.nullable
+        if kind.text.startswith(OutputFile.script_kind) and NUMBER.fullmatch(argument.text):
+            return False
         try:
             kind.convert(hub, argument)
         except (Unfit, ScriptError):
@@ -189,10 +215,10 @@ def misfit(
     parameter: Parameter, argument: Argument, number: int | None, unfit: Unfit
 ) -> ScriptError:
     which = f"argument {number} '{parameter.name}'" if number else f"'{parameter.name}'"
-    family, text, hint = parameter.kind.family, parameter.kind.text, unfit.hint
+    family, text, hint = parameter.kind.family, parameter.text, unfit.hint
     if family and NUMBER.fullmatch(argument.text):
         text, hint = f"one of {', '.join(registry.names(family))}", None
-    if "time(T)" in text and NUMBER.fullmatch(argument.text):
+    if "time(T)" in text and (number_of(argument.text) or 0) > 0:
         hint = f"time({argument.text}) is a time"
     message, mark = f"{which} must be {text}, not {unfit.got}", unfit.mark or argument.mark
     return ScriptError(message, mark=mark, expected=text, hint=hint, code="argument")

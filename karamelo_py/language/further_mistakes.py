@@ -193,11 +193,15 @@ def _look_up(
     ):
         return
     if style not in variables and re.fullmatch(r"[a-zA-Z][\w/-]*", style):
+        ID, *words = words_of(statement)
         try:
-            registry.find(name, style)
+            if name in ("fix", "compute"):
+                registry.called(name, ID, style, *words[where : where + 1])
+            else:
+                registry.find(name, style)
         except ScriptError as error:
-            error.command, error.mark = name, arguments[where].mark
-            ID, *words = words_of(statement)
+            index = {"ID": 0, 2: 2}.get(error.argument or "", where)
+            error.command, error.mark = name, arguments[index].mark
             error.hint = renamed(name, style, ID, words[where:]) or error.hint
             raise
 

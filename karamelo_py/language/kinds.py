@@ -89,7 +89,11 @@ class InputFile:
         if here.exists() and not here.is_dir():
             problem = "is a pipe or a device, not a file"
         expected = "a file in the current folder or the folder of the script"
-        hint = meant(here.name, [p.name for p in files])
+        words = re.split(r"[\s,;]+", name.strip())
+        if all(map(NUMBER.fullmatch, words)):
+            hint = f"numbers are separated by commas, without quotes: {', '.join(words)}"
+        else:
+            hint = meant(here.name, [p.name for p in files])
         message = f"the file {name} {problem}"
         mark, code = argument.mark, "no-file"
         raise ScriptError(message, mark=mark, expected=expected, hint=hint, code=code)
@@ -243,7 +247,7 @@ class StyleOf:
 def _to_expression(hub: Scene, argument: Argument) -> Expression:
     value = argument.value(hub)
     if isinstance(value, str):
-        raise Unfit(_shown(value))
+        raise Unfit(_shown(value), hint=f"write formulas without quotes: {value}")
     return Expression(value)
 
 
@@ -368,6 +372,11 @@ class Parameter:
     default: Any = None
     description: str = ""
     field: str = ""
+
+    @property
+    def text(self) -> str:
+        by_default = self.optional and self.default is None
+        return self.kind.text.removesuffix(" or NULL") if by_default else self.kind.text
 
     @property
     def shown(self) -> str:

@@ -146,12 +146,18 @@ def find(family: str, name: str) -> Any:
     return _loaded[key]
 
 
-def called(family: str, ID: str, name: str) -> Any:
-    """Return a style as `find` does. If the style was written before the ID, the error says so."""
-    if not knows(family, name) and knows(family, ID):
+def called(family: str, ID: str, name: str, third: str = "") -> Any:
+    """Return a style as `find` does. If it was written first or third, the error says so."""
+    if knows(family, name):
+        return find(family, name)
+    if knows(family, ID):
         message = f"'{ID}' is a style, and the ID comes first"
         raise ScriptError(message, argument="ID", expected=f"{family}(ID, {ID}, {name}, ...)")
-    return find(family, name)
+    if knows(family, third):
+        message = f"'{third}' is a style, and the style comes before the group"
+        raise ScriptError(message, argument=2, expected=f"{family}({ID}, {third}, {name}, ...)")
+    # find() raises an error that suggests a name
+    return find(family, third if instead(family, third) else name)
 
 
 def _entries(family: str, name: str) -> list[EntryPoint]:

@@ -75,14 +75,25 @@ class Restrictions(NamedTuple):
         instead = ", ".join(names[:-1]) + " or " * (len(names) > 1) + "".join(names[-1:])
         return self.but.get(kind) or instead or feature.instead
 
-    def error(self, subject: Feature, feature: Feature) -> ScriptError:
-        message = f"{subject.words} does not support {feature.words}"
-        mark = feature.mark or subject.mark
-        return ScriptError(message, mark=mark, expected=self.instead_of(feature))
+
+class Conflict(NamedTuple):
+    subject: Feature
+    restrictions: Restrictions
+    feature: Feature
+
+    @property
+    def mark(self) -> Mark | None:
+        return self.feature.mark or self.subject.mark
+
+    @property
+    def mistake(self) -> tuple:
+        """A wrong option conflicts with several parts, and a part with several words of a line."""
+        feature, mark = self.feature, self.mark
+        return (self.subject.words, mark and mark.line) if feature.name else (feature.words,)
 
 
 def compare(declared: Mapping[Feature, Restrictions], features: Iterable[Feature]) -> None:
-    errors: dict[frozenset[str], ScriptError] = {}
+    conflicts: dict[frozenset[str], Conflict] = {}
     features = [*features, *declared]
     excluded: set[str] = set()
     for subject, restrictions in declared.items():
@@ -90,11 +101,25 @@ def compare(declared: Mapping[Feature, Restrictions], features: Iterable[Feature
             continue
         for feature in filter(restrictions.exclude, features):
             pair = frozenset((subject.words, feature.words))
-            errors.setdefault(pair, restrictions.error(subject, feature))
+            conflicts.setdefault(pair, Conflict(subject, restrictions, feature))
             excluded.add(feature.words)
-    for error in errors.values():
-        error.others = [*errors.values()][1:]
+    mistakes: dict[tuple, list[Conflict]] = {}
+    for conflict in conflicts.values():
+        mistakes.setdefault(conflict.mistake, []).append(conflict)
+    errors = [_error(mistake) for mistake in mistakes.values()]
+    for error in errors:
+        error.others = errors[1:]
         raise error
+
+
+def _error(mistake: list[Conflict]) -> ScriptError:
+    subjects = dict.fromkeys(conflict.subject.words for conflict in mistake)
+    features = dict.fromkeys(conflict.feature.words for conflict in mistake)
+    words = mistake if mistake[0].feature.name else mistake[:1]
+    instead = dict.fromkeys(one.restrictions.instead_of(one.feature) for one in words)
+    verb = "do" if len(subjects) > 1 else "does"
+    message = f"{' and '.join(subjects)} {verb} not support {' and '.join(features)}"
+    return ScriptError(message, mark=mistake[0].mark, expected=", and ".join(instead))
 
 
 class Advice(NamedTuple):

@@ -304,7 +304,7 @@ def convert(hub: Scene, parameter: Parameter, argument: Argument, number: int | 
         raise explain.misfit(parameter, argument, number, unfit) from None
     except ScriptError as error:
         error.mark = error.mark or argument.mark
-        error.expected = error.expected or f"{parameter.name}: {parameter.kind.text}"
+        error.expected = error.expected or f"{parameter.name}: {parameter.text}"
         raise
 
 

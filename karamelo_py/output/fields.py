@@ -403,6 +403,8 @@ def unknown_column(message: str, name: str, names: Iterable[str], **where: Any) 
             last = name[-1].translate(str.maketrans("123", "xyz"))
             error.alike = f"u{last}" if last in "xyz" else "ux"
             error.hint = f"did you mean '{error.alike}'?"
+    if error.alike == name:
+        error.alike, error.hint = None, f"dump particle writes {name}, a column of points"
     if name in ("pore_pressure", "saturation"):
         error.hint = "only points of a material with pore_water(...) have this column"
     if name[:2] in ("v_", "c_"):  # as in LAMMPS

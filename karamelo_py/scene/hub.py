@@ -12,7 +12,7 @@ import numpy as np
 from karamelo_py.kernels.equations.move import VelocityBefore
 from karamelo_py.language import registry
 from karamelo_py.language.faults import as_script_error
-from karamelo_py.language.unknown import line_below
+from karamelo_py.language.unknown import line_below, words_of
 from karamelo_py.output.console import Console
 from karamelo_py.output.fields import Fields
 from karamelo_py.output.record import RunRecord
@@ -75,8 +75,14 @@ class Catalogue(dict):
             kind = "solid" if near in self.hub.solids else "region"
             hint = f"{near} is a {kind}, not a group; all is the group of all points"
         if self.kind == "group" and other in ("region", "solid"):
-            who = f"{ID}, all" if other == "region" else f"regionID, solid, {ID}"
+            filled = self.hub.solids[ID].region if other == "solid" else None
+            region = "regionID" if filled is None else filled.id
+            who = f"{ID}, all" if other == "region" else f"{region}, solid, {ID}"
             hint = f"group({ID}, particles, region, {who}) makes a group of a {other}"
+        statement = self.hub.interpreter.statement
+        first, *words = words_of(statement) or [""]
+        if self.kind == "group" and first in names and words[1:2] == [ID]:
+            hint = f"{statement.name}({', '.join([ID, words[0], first, *words[2:]])})"
         if below is not None:
             hint = f"{self.kind} '{ID}' is defined further down: move line {below} up"
         raise ScriptError(

@@ -5,6 +5,7 @@ from typing import Annotated
 
 import numpy as np
 
+from karamelo_py.language.rules import known_failure
 from karamelo_py.language.signature import In, Positive
 from karamelo_py.output.fields import check_columns
 from karamelo_py.output.point_table import COMPONENTS, PointTable
@@ -271,6 +272,10 @@ def _numbers(bits: np.ndarray) -> np.ndarray:
     return np.where(bits >> np.uint64(63) > 0, bits ^ SIGN, ~bits).view(float)
 
 
+FAR = "no point is near {place}; the nearest, with id {id}, is at a distance of {distance}"
+INSIDE = "a position inside the body, or point=... for the point with this id"
+
+
 class Probe(Mean):
     """Measure columns of the points, such as a stress: means, or values at one point.
 
@@ -331,17 +336,24 @@ class Probe(Mean):
         if self.point is None and not self.at:
             super().refresh()
             return
-        nearest = min(self.hub.fields.each(self, "nearest"), default=None)
+        nearest = self._nearest()
         self.publish_all(*(nearest[2:] if nearest else [self.empty] * len(self.columns)))
-        if nearest and self.at and nearest[0] > self.hub.domain.h**2 and not self._has_warned:
-            self._has_warned = True
-            place = ", ".join(f"{axis}={c:g}" for axis, c in self.at.items())
+        if far := self.far():
             self.hub.warn(
-                f"compute probe '{self.id}': no point is near {place}; the nearest, with id "
-                f"{nearest[1]:.0f}, is at a distance of {nearest[0] ** 0.5:.3g}",
-                mark=self.mark,
-                hint="a position inside the body, or point=... for the point with this id",
+                f"compute probe '{self.id}': " + FAR.format(**far), mark=self.mark, hint=INSIDE
             )
+
+    def _nearest(self) -> list[float] | None:
+        return min(self.hub.fields.each(self, "nearest"), default=None)
+
+    def far(self) -> dict[str, str]:
+        """Return, once, words about a position more than a cell away from all points."""
+        nearest = self._nearest() if self.at and not self._has_warned else None
+        if nearest is None or nearest[0] <= self.hub.domain.h**2:
+            return {}
+        self._has_warned = True
+        place = ", ".join(f"{axis}={c:g}" for axis, c in self.at.items())
+        return {"place": place, "id": f"{nearest[1]:.0f}", "distance": f"{nearest[0] ** 0.5:.3g}"}
 
     def terms(self, points: PointTable) -> list[np.ndarray]:
         volume = points.particle("volume")
@@ -358,3 +370,12 @@ class Probe(Mean):
             return None
         at = min(np.flatnonzero(distance == least), key=ids.__getitem__)
         return [least, *(float(points.particle(name)[at]) for name in ("id", *self.columns))]
+
+
+known_failure(
+    Probe,
+    "compute probe '{part.id}'",
+    when=lambda probe, scene: probe.far(),
+    reason=FAR,
+    cure=INSIDE,
+)

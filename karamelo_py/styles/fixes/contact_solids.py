@@ -69,8 +69,8 @@ class ContactSolids(PairContact):
     ):
         if not hub.update.method.own_grids:
             raise ScriptError(
-                "contact/solids needs a separate grid for each solid",
-                expected="method(tlmpm, ...)",
+                "it needs a separate grid for each solid",
+                expected="method(tlmpm, ...) or method(tlcpdi, ...)",
                 hint="with method(ulmpm/contacts, ...), solids touch on the grid, with friction by "
                 "fix contact/friction",
             )

@@ -19,7 +19,7 @@ from karamelo_py.scene.hub import Hub
 from karamelo_py.scene.modify import Fix
 from karamelo_py.scene.region import Region
 from karamelo_py.scene.solid import Solid, named
-from karamelo_py.script.errors import ScriptError, plural
+from karamelo_py.script.errors import ScriptError, blaming, plural
 from karamelo_py.script.expressions import Expression
 from karamelo_py.styles.fixes.formulas import judge_friction
 from karamelo_py.styles.fixes.tools.base import begin_behind
@@ -314,9 +314,10 @@ class RigidBody(Fix):
             return items
         parts = components.argument.listed()
         if len(parts) != len(ways):
-            noun = "formulas" if len(ways) != 1 else "formula"
-            expected = f"{len(ways)} {noun}" if ways else "nothing: it does not rotate here"
-            error = _wrong(components.argument, plural(len(parts), "component"), expected)
+            expected, message = plural(len(ways), "formula"), plural(len(parts), "component")
+            if not ways:
+                message, expected = "the body does not rotate here", "no such argument"
+            error = _wrong(components.argument, message, expected)
             if ", " in components.argument.text:
                 error.hint = comma_in_number(parts, len(parts) - len(ways))
             elif len(parts) == 1 and ways:
@@ -326,7 +327,8 @@ class RigidBody(Fix):
             items[way % 3] = item
             if item is None:
                 continue
-            item.evaluate(self.hub.values)
+            with blaming(part.mark):
+                item.evaluate(self.hub.values)
             if way not in self.ways and not (item.is_constant and float(item.constant) == 0):
                 message = f"the body moves along the axis only, not along {WAYS[way]}"
                 raise _wrong(part, message, "0")

@@ -5,7 +5,7 @@ from typing import Annotated, Any, Literal, NamedTuple
 
 import numpy as np
 
-from karamelo_py.language.arguments import look_up
+from karamelo_py.language.arguments import NUMBER, look_up
 from karamelo_py.language.rules import known_failure
 from karamelo_py.language.signature import Argument, In, NonNegative, Positive
 from karamelo_py.scene.hub import Hub
@@ -46,7 +46,8 @@ class Party(NamedTuple):
         if solid is None and ID not in hub.regions:
             rigid = (solid.id for solid in hub.solids.values() if solid.rigid)
             message = f"there is no solid and no region '{ID}'"
-            raise unknown(message, ID, dict.fromkeys([*rigid, *hub.regions]), mark=mark)
+            hint = f"mu={ID}, restitution=..." if NUMBER.fullmatch(ID) else None
+            raise unknown(message, ID, dict.fromkeys([*rigid, *hub.regions]), hint, mark=mark)
         region = look_up(hub.regions, argument) if solid is None else solid.region
         if solid is not None:
             _require_rigid(solid, mark)
