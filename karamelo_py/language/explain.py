@@ -43,7 +43,8 @@ def wrong_count(
         misfit = next(
             (a for s, a in zip(needed, arguments, strict=False) if not _fits(s, a.text)), None
         )
-        mark, hint = misfit and misfit.mark, hint or _completed(name, needed, arguments, misfit)
+        mark = misfit.mark if misfit is not None else None
+        hint = hint or _completed(name, needed, arguments, misfit)
     message = f"{'one argument' if len(surplus) == 1 else f'{len(surplus)} arguments'} too many"
     if missing:
         message = f"{', '.join(missing)} {'is' if len(missing) == 1 else 'are'} missing"

@@ -90,10 +90,9 @@ class InputFile:
             problem = "is a pipe or a device, not a file"
         expected = "a file in the current folder or the folder of the script"
         words = re.split(r"[\s,;]+", name.strip())
+        hint = meant(here.name, [p.name for p in files])
         if all(map(NUMBER.fullmatch, words)):
             hint = f"numbers are separated by commas, without quotes: {', '.join(words)}"
-        else:
-            hint = meant(here.name, [p.name for p in files])
         message = f"the file {name} {problem}"
         mark, code = argument.mark, "no-file"
         raise ScriptError(message, mark=mark, expected=expected, hint=hint, code=code)
