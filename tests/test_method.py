@@ -169,6 +169,7 @@ fix(hold, velocity_nodes, low, 0, 0)
 fix(weight, body_force, all, 0, -10*time)
 set_dt(0.01)
 """
+POINTS = f"{PAIR}\nfix(touch, contact/minimize_penetration, body, other)"
 DIAGONAL = PAIR.replace("1.2, 0.2, 0.6", "1.2, 0.8, 0.95").replace("1e3, 0", "1e3, 1e3")
 
 
@@ -213,7 +214,9 @@ def fluid(eos, strength="fluid, 0"):
         (RUBBER, f"{HELD}scheme(quasi-static)\nset_dt(1)",
          "method(tlmpm, FLIP, quadratic-spline, 1)"),
         (RUBBER, HELD.replace("10*time", "sin(200*time)"),
-         "method(tlmpm, PolyPIC, linear); scheme(usl)"),
+         "method(tlmpm, PolyPIC, linear); scheme(usl, start=half)"),
+        (fluid("linear, 1000, 1e6", "plastic, 5e5, 1e3"), POINTS,
+         "method(tlmpm, FLIP, linear, 0.99); anti_volumetric_locking(true)"),
         (RUBBER, PRESSED, "method(ulmpm/contacts, APIC, quadratic-spline)"),
         (RUBBER, f"{OTHER}fix(rub, contact/friction, body, other, 0.2)",
          "method(ulmpm/contacts, FLIP, cubic-spline, 0.99)"),
@@ -243,9 +246,18 @@ def test_auto_leaves_what_the_script_names(run_interpreted):
     for target in ("0", "-1", "1", "2", "small", '"0.1"'):
         with pytest.raises(ScriptError, match=r"accuracy|small"):
             Interpreter(Hub()).run_text(text.replace("auto", f"auto, accuracy={target}", 1), "in")
+    on_line = OTHER.replace("0.8, 1.2, 0.2, 0.6", "0.8, 0.9")
     for wrong, line, words in (
         (text.replace("rubber", "m").replace("0.3)", "0.7)"), 5, "Poisson's ratio 0.7"),
         (text.replace("auto", "auto, FLIP"), 2, "one argument too many"),
+        (text.replace("auto", "auto, thermo-mechanical"), 2,
+         "hint: method(auto): heat flows if a material conducts it"),
+        (text.replace("auto", "ulmpm, auto"), 2, "hint: method(auto) chooses all of them"),
+        (text.replace("scheme(musl)", f"{on_line}scheme(semi-implicit)\n"
+                      "fix(touch, contact/solids, body, other)"), 10,
+         "expected: scheme(musl), or the scene without this fix"),
+        (text.replace("scheme(musl)", f"{on_line}fix(touch, contact/solids, body, other)\n"
+                      "fix(v, initial_velocity_particles, other, 1)"), 10, "'other' is a solid"),
         (f"{text.replace('auto', 'ulmpm, FLIP, linear, 1', 1)}method(auto)\nrun(1)", 9,
          "the method cannot change once there are solids"),
         ("method(auto)", 1, "method(auto) reads the script ahead"),

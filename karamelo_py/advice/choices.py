@@ -160,6 +160,14 @@ CHOICES = (
         ("in.collapse", "in.slump"),
     ),
     Choice(
+        lambda s: s.shocked and not s.elastic_only and s.alone and len(s.soft) > 1,
+        ("method(tlmpm, FLIP, linear, 0.99)", "anti_volumetric_locking(true)"),
+        "a shock in bodies with a fix for contact between their points",
+        "such a fix needs a grid for each body, FLIP 0.99 damps oscillations, and F-bar avoids "
+        "locking in plastic flow",
+        ("in.cold_spray",),
+    ),
+    Choice(
         lambda s: s.shocked and not s.elastic_only,
         ("method({grid}, APIC, cubic-spline)",),
         "a shock",
@@ -195,9 +203,18 @@ CHOICES = (
         ("in.column", "in.cantilever"),
     ),
     Choice(
+        lambda s: s.alone and s.weighed,
+        ("method(tlmpm, PolyPIC, linear)", "scheme(usl, start=half)"),
+        "elastic bodies with a body force, alone or with a fix for their contact",
+        "points stay in their cells, so a linear basis is second order and conserves energy and "
+        "angular momentum",
+        ("in.throw", "in.vertical_bar"),
+        "start=half, so that the path of a projectile is exact",
+    ),
+    Choice(
         lambda s: s.alone,
         ("method(tlmpm, PolyPIC, linear)", "scheme(usl)"),
-        "one elastic body",
+        "elastic bodies, alone or with a fix for their contact",
         "points stay in their cells, so a linear basis is second order and conserves energy and "
         "angular momentum",
         ("in.energy_disk", "in.turns", "in.axis_aligned"),

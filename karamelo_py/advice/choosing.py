@@ -317,4 +317,5 @@ def _facts(hub: Hub) -> Scouted | None:
             return scouted(hub, (line,))
         except ScriptError as error:
             errors.append(error)
-    raise errors[0]
+    # Others may be about the method of the rehearsal, not about the script.
+    raise min(errors, key=lambda error: len(error.others))

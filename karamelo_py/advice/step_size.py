@@ -97,7 +97,8 @@ def step_by_script(fixed_dt: float | None, dt_factor: float | None) -> str:
 def words_of_limit(simulation: Simulation) -> str:
     limit, scheme = simulation.ruling_limit, simulation.hub.update.scheme
     words = EXPLAINED.get(limit, "")
-    if limit == "light_nodes" and max(scheme.traits.courant) < 1:
+    lossless = simulation.hub.update.transfer.traits.lossless
+    if limit == "light_nodes" and max(scheme.traits.courant) < 1 and not lossless:
         courant = float(simulation.control.step[0].courant)
         name = registry.name_of("scheme", type(scheme))
         words = f" and nodal modes in scheme {name}, stable up to {courant:.2g} h/c"

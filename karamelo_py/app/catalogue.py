@@ -10,7 +10,7 @@ from pathlib import Path
 
 from karamelo_py.language import registry, rules
 from karamelo_py.language.help import Help, describe
-from karamelo_py.language.signature import Parameter
+from karamelo_py.language.signature import FORMS, Parameter
 from karamelo_py.output.console import Console
 from karamelo_py.script.errors import ScriptError, codes, instead, meant, table
 
@@ -26,7 +26,16 @@ def families() -> list[str]:
     return sorted(registry.families(), key=lambda family: (family != COMMAND, family))
 
 
+def _form(family: str, word: str) -> Callable | None:
+    """Return the form of the command `family` that `word` selects, such as method(auto)."""
+    if not registry.knows(COMMAND, family):
+        return None
+    return FORMS.get(registry.find(COMMAND, family), {}).get(word)
+
+
 def help_of(family: str, name: str) -> Help:
+    if form := _form(family, name):
+        return describe(form, family)
     target = registry.find(family, name)
     try:
         return describe(target, name if family == COMMAND else f"{family} {name}")
@@ -206,7 +215,8 @@ def _explain(family: str, name: str) -> int:
     help_ = help_of(family, name)
     page = _Page()
     page.say(help_.name, "bold")
-    page.say(f"from {registry.origin(family, name)}")
+    origin = (COMMAND, family) if _form(family, name) else (family, name)
+    page.say(f"from {registry.origin(*origin)}")
     page.say()
     page.say(f"  {help_.syntax}")
     for text in filter(None, (help_.summary, help_.text)):

@@ -140,6 +140,11 @@ def auto(
     accuracy
         The largest error, a fraction, for ``karamelo-py advise``, which compares this choice with
         other set-ups (docs/studies/advise.md). A single run does not check this error.
+
+    Example
+    -------
+    method(auto)
+    method(auto, accuracy=0.01)
     """
     _refuse_after_solids(hub)
     interpreter = hub.interpreter

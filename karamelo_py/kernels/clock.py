@@ -68,6 +68,11 @@ def choose_dt(control: Control) -> None:
     if motion.weight != 1 and motion.speed * dt > STRIDE:
         dt = STRIDE / motion.speed
     dt = step.fixed_dt if step.fixed_dt > 0 else dt
+    anew = step.last_dt == 0
+    if step.release > 0 and not anew:
+        if 0 < step.held_dt < dt <= step.release * step.held_dt:
+            dt = step.held_dt
+        step.held_dt = dt
     whole = dt
     limit = min(limit, heat.heat_limit)
     step.limit = limit
@@ -79,7 +84,6 @@ def choose_dt(control: Control) -> None:
     elif 0 < remaining < 2 * dt * (1 - ROUNDING):
         dt = 0.5 * remaining
     control.values[DT] = dt
-    anew = step.last_dt == 0
     last, last_contact = (dt, whole) if anew else (step.last_dt, step.last_contact_dt)
     step.kick = 0.5 * (last + dt)
     step.contact_dt = max(whole, last_contact - FOLLOWING * dt)

@@ -197,9 +197,10 @@ def _is_all_wet(hub: Hub) -> bool:
 
 
 def _courant_of_scheme(hub: Hub, *, longer: bool) -> float:
-    scheme, method = hub.update.scheme, hub.update.method
+    update = hub.update
+    scheme, method = update.scheme, update.method
     two, one = courant_of(hub, scheme)
-    if min(two, one) < 1:
+    if min(two, one) < 1 and not update.transfer.traits.lossless:
         # Nodes between cell corners increase the highest frequency.
         nodes = 0.7 if method.basis.traits.nodes_per_cell > 1 else 1
         return (one if sparse(hub) else two) * nodes

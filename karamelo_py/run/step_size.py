@@ -27,6 +27,9 @@ from karamelo_py.schemes.traits import DEFAULT_FRACTION
 from karamelo_py.script.errors import ScriptError
 
 NO_STRIDE = 1e9  # path in cells that points never reach
+# Largest / smallest stable step in a large vibration. Without losses in the transfer, a step that
+# follows the strain in each vibration adds energy; a step that is held adds none.
+RELEASE = 1.9
 
 
 class StepPolicy(NamedTuple):
@@ -35,6 +38,7 @@ class StepPolicy(NamedTuple):
     weight: float  # weight of the common velocity in the rate
     fixed_dt: float  # 0 if the step adapts to the fastest point
     heat_factor: float  # fraction of the limit of conduction
+    release: float = 0.0  # `release` of the clock
 
     @classmethod
     def of(cls, hub: Hub) -> StepPolicy:
@@ -42,7 +46,8 @@ class StepPolicy(NamedTuple):
         fixed = update.fixed_dt or float(update.scheme.traits.implicit)  # implicit: 1 by default
         if update.dt_factor is None and update.fixed_dt is None:
             still, moving = (own_step_of_waves(hub, still=still) for still in (True, False))
-            return cls(still, moving, own_weight_of_drift(hub), fixed, DEFAULT_FRACTION)
+            release = RELEASE * update.transfer.traits.lossless
+            return cls(still, moving, own_weight_of_drift(hub), fixed, DEFAULT_FRACTION, release)
         # Fractions that scripts set refer to h/(c + |v|), even if the points are at rest.
         asked = courant_number(hub, longer=False), update.dt_factor or conserving_fraction(hub)
         return cls(asked, asked, 1.0, fixed, update.dt_factor or DEFAULT_FRACTION)
@@ -57,6 +62,7 @@ class StepPolicy(NamedTuple):
             "heat_factor": self.heat_factor * scale,
             "dt_factor": fraction * scale,
             "dt_factor_moving": self.moving[1] * scale,
+            "release": self.release,
         }
 
 

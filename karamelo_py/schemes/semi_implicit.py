@@ -54,7 +54,8 @@ class SemiImplicit(NamedTuple):
         solves_pressure=True,
         restrictions=Restrictions(
             "semi-implicit", "scheme(musl)",
-            without=("single", "ranks", "gpu", "periodic", "yielding walls", "tools", "rigid"),
+            without=("single", "ranks", "gpu", "periodic", "yielding walls", "rigid"),
+            but={"tools": "scheme(musl), or the scene without this fix"},
         ),
     )  # fmt: skip
     node_fields = (CellSums, CellPressures, CellGrowth, NodeResponse)

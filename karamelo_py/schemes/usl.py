@@ -23,6 +23,7 @@ class USL(NamedTuple):
     The stable step is 0.65 h/c, or 0.4 h/c with one point per cell; with bernstein-quadratic it is
     30 % shorter. Points do not retain the velocity of some nodal modes; the strain of these modes
     is multiplied by 1 - (w dt)^2 in each step, so they are stable for w dt < sqrt(2) instead of 2.
+    With PolyPIC in tlmpm, points retain all modes, and the stable step is h/c.
 
     A node with almost no mass may get a large velocity. If its mass is below a limit, the mean mass
     of the points around it times d (c dt / h)^2 (at most 1), its velocity change is multiplied by

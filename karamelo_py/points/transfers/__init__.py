@@ -20,6 +20,7 @@ class TransferTraits(NamedTuple):
     retains: bool = False  # points retain the fraction `alpha` of their velocity
     per_time: bool = False  # alpha applies to a stable step
     keeps_gradient: bool = False  # `Moment` is the velocity gradient
+    lossless: bool = False  # maps nodal velocities to points and back without loss
     series: bool = False  # the new velocity is a series, which needs further passes over the points
     # Fraction of the stable step with musl in the total frame.
     fraction_in_total: float = 1.0
