@@ -89,7 +89,7 @@ CHOICES = (
     ),
     Choice(
         lambda s: s.gas and s.speed > 1 and s.d > 1 and s.diffuses,
-        ("method(ulmpm, TPIC, cubic-spline)", "scheme(usavg)"),
+        ("method(ulmpm, TPIC, cubic-spline)", "scheme(usavg)", "dt_factor(0.6)"),
         "a gas that moves faster than its waves, with an artificial heat flux",
         "",
         ("in.noh",),

@@ -307,6 +307,8 @@ def _written(lines: Sequence[str], facts: Scouted) -> tuple[str, ...]:
     heat = ", thermo-mechanical" * facts.hot
     if facts.hub.update.scheme_mark is not None:  # the script sets a scheme
         others = [line for line in others if not line.startswith("scheme(")]
+    if facts.hub.update.fixed_dt is not None or facts.hub.update.dt_factor is not None:
+        others = [line for line in others if not line.startswith("dt_factor(")]
     return f"{first[:-1]}{heat})", *others
 
 
