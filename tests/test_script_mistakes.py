@@ -341,6 +341,10 @@ def test_words_in_each_others_places(run_interpreted, line, told):
         ("dump(d, all, pyplot, 1, d.*.png, 9, 9, x, 0)", "hint: the range of colours is vmin=..."),
         ("scheme(implicit)", "hint: quasi-static, for load steps without inertia"),
         ("read_restart(none.h5)", "there is no file none.h5"),
+        ("load_path(p, 1, e11=1)", "hint: write exx=..."),
+        ("modify(material, rubber, young=1)", "hint: write E=..."),
+        ("fix(t, edge_traction, all, box, left, 1, 0)", "hint: write xlo"),
+        ("group(g, particles, region, box, solids, body)", "hint: did you mean 'solid'?"),
         ("a = ln(5)", "hint: log(x) is the natural logarithm"),
     ],
 )

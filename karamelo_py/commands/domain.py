@@ -17,7 +17,7 @@ from karamelo_py.scene.hub import Hub
 from karamelo_py.scene.lattice import RELATIVE_TOLERANCE
 from karamelo_py.scene.region import Region
 from karamelo_py.scene.solid import Solid, own_grids, warn_of_coinciding
-from karamelo_py.script.errors import ScriptError
+from karamelo_py.script.errors import ScriptError, meant
 from karamelo_py.script.parser import parse_text
 from karamelo_py.styles.meshes import MeshFile, near_set
 
@@ -405,8 +405,11 @@ def group(
         region, of = near_set(hub, ID, region, of), "all"
     form = f"group({ID}, {kind}, region, {region.id}"
     if of not in ("all", "solid"):
-        message = f"'of' must be one of all, solid, not '{of}'"
-        raise ScriptError(message, argument="of", expected="one of all, solid")
+        message, hint = (
+            f"'of' must be one of all, solid, not '{of}'",
+            meant(str(of), (ALL, "solid")),
+        )
+        raise ScriptError(message, argument="of", expected="one of all, solid", hint=hint)
     if of == "solid" and not solids:
         expected = f"{form}, solid, solidID, ...)"
         raise ScriptError("no solid is named", argument="of", expected=expected)

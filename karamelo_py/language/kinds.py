@@ -14,7 +14,7 @@ from typing import Annotated, Any, Literal, TypeVar, Union, get_args, get_origin
 from karamelo_py.language import registry
 from karamelo_py.language.arguments import NULL, NUMBER, Argument
 from karamelo_py.language.scene import Scene
-from karamelo_py.script.errors import Mark, ScriptError, meant
+from karamelo_py.script.errors import Mark, ScriptError, meant, table
 from karamelo_py.script.expressions import Expression, Value
 from karamelo_py.script.functions import CONSTANTS, WORDS
 from karamelo_py.script.terms import number_text
@@ -267,7 +267,8 @@ def _no_word_of(words: tuple[str, ...], word: str, argument: Argument) -> Unfit:
         got += f", which is {number_text(value)}"
     elif literal:
         value = float(word)
-    hint = meant(word, words)
+    other = table()["words"].get(word)
+    hint = f"write {other}" if other in words else meant(word, words)
     if words == TRUTH and value in (0, 1):
         truth = TRUTH[not value]
         hint = f"write {truth}" if literal else f'write {word} = "{truth}"'

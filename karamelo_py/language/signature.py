@@ -41,7 +41,7 @@ from karamelo_py.language.kinds import (
 )
 from karamelo_py.language.scene import Scene
 from karamelo_py.language.unknown import check_name, renamed
-from karamelo_py.script.errors import FAILURES, ScriptError, blaming, meant, table
+from karamelo_py.script.errors import FAILURES, ScriptError, blaming, table
 
 __all__ = [
     "Argument", "AtLeast", "ByName", "Constraint", "In", "InputFile", "Keyword", "NonNegative",
@@ -191,10 +191,13 @@ def remade(
     try:
         for argument in arguments:
             word, value = argument.keyword() or ("", argument)
+            if not word:
+                choices = ", ".join(f"{n}=..." for n in expected)
+                message = f"'{argument.text}' has no name"
+                raise ScriptError(message, mark=argument.mark, expected=choices)
             if word not in expected:
-                message = f"{name} has no '{word}'" if word else f"'{argument.text}' has no name"
-                choices, near = ", ".join(f"{n}=..." for n in expected), meant(word, expected)
-                raise ScriptError(message, mark=argument.mark, expected=choices, hint=near)
+                form = syntax(target, name)
+                raise explain.unknown_keyword(word, argument, [*expected.values()], name, form)
             bound[word] = [value]
             values = values | {word: convert(hub, expected[word], value)}
         several = next((p.name for p in expected.values() if p.variadic), None)
