@@ -121,6 +121,26 @@ def test_force_of_springs(run_interpreted):
     assert force == pytest.approx(-3 * soft - stiff, rel=1e-8)
 
 
+def test_springs_are_not_stiffer_than_the_step_allows(run_interpreted):
+    """Above m/2 p / dt^2, points that separate would gain or lose energy."""
+    force = 0.5 * 0.01 * 0.01 / 1e-6
+    log = run_interpreted(two_points(f"{SPRINGS}, stiffness=1e6", 2)).log
+    assert log.c_x[-1] == pytest.approx(-force, rel=1e-8)
+
+
+@pytest.mark.parametrize("second", ["minimize_penetration, b, a, 0.2", "hertz, a, b"])
+def test_two_contacts_of_one_pair_are_refused(run_interpreted, second):
+    """Their forces added up."""
+    again = f"fix(again, contact/{second})\nrun(1)"
+    text = two_points(MINIMIZE, 2).replace("run(1)", again)
+    assert again in text
+    error = run_interpreted(text, status=1).err
+    assert "fix 'c' (line" in error
+    assert "is the contact of 'a' and 'b' already" in error
+    replaced = text.replace("fix(again", "fix(c")
+    run_interpreted(replaced)
+
+
 @pytest.mark.parametrize("slip, share", [(50, 0.2), (-50, -0.2), (0.5, 0.05)])
 def test_friction_of_two_points(run_interpreted, slip, share):
     """mu times the force across, along the slip of the other; at most what stops it (m/2 v/dt)."""
@@ -230,10 +250,11 @@ def test_sliding_block_slows_down(run_script):
 
 
 def test_two_contacts_add_up(run_interpreted):
-    """Of two fixes each force is there, and each publishes its own."""
+    """Each of two solids at one place pushes the third, and each fix publishes its force."""
     log = "log_modify(custom, step, c_x, c2_x, va_x)"
+    twin = ("solid(b2, region, b, 1, m, 0.1)", f"fix(c2, {MINIMIZE.replace('b', 'b2')})")
     once = ("set_dt(0.001)", log, "run(1)")
-    one = run_interpreted(bodies(-0.01, MINIMIZE, f"fix(c2, {MINIMIZE})", *once, n=1, ppc=1)).log
+    one = run_interpreted(bodies(-0.01, MINIMIZE, *twin, *once, n=1, ppc=1)).log
     assert one.c_x[-1] == one.c2_x[-1] == pytest.approx(-0.05 * 0.01 / 1e-6, rel=1e-8)
     assert one.va_x[-1] == pytest.approx(0.1 + 2 * one.c_x[-1] / 0.1 * 0.001, rel=1e-8)
 

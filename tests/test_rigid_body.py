@@ -365,6 +365,18 @@ def test_friction_with_a_limit_acts_on_the_whole_area(run_interpreted, d, ppc):
     assert log.f_y[1:].mean() > 0.5 * 2 ** (d - 1)
 
 
+@pytest.mark.parametrize("ppc", [1, 2])
+def test_a_limit_of_friction_acts_on_the_surface_of_a_shaft(run_interpreted, ppc):
+    """The stress times radius and length, for points half a cell or a quarter outside of them."""
+    text = DRAGGED.format(
+        d=2, ppc=ppc, box="0, 7, 0, 6", plate="block, 0, 3, 1, 5", block="block, 3, 5, 2, 4",
+        motion="0, 0.5", turning="0", weight=", -1, 0",
+    ).replace(", turning=0", "")  # fmt: skip
+    text = text.replace("region(plate", "axisymmetric(true)\nregion(plate")
+    log = run_interpreted(text).log
+    assert log.f_y[1:] == pytest.approx(np.full(3, 0.1 * 3 * 2), rel=0.002)  # it strains
+
+
 def test_a_limit_of_friction_without_friction_is_refused(run_interpreted):
     script = INSIDE_OUT + "fix(t, contact/rigid_body, all, bar, limit=1)\nrun(1)"
     assert "needs a coefficient of friction mu" in run_interpreted(script, status=1).err

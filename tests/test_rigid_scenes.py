@@ -47,6 +47,65 @@ def test_a_heavy_disk_bends_a_beam_in_one_load_step(run_script):
     assert [log.d_fy[-1], log.clamp_y[-1]] == pytest.approx([2000, 2000], rel=1e-8)
 
 
+PLATE = """
+{method}
+dimension(2, 0, 2.2, -0.8, 1.6, h)
+axisymmetric(true)
+region(plate, block, 0, 2.2, 0, 0.4)
+region(ball, cylinder, 0, 0.7, 0.3)
+material(rubber, {law}, 1000, 1e7, 0.3)
+material(steel, rigid, 7850)
+solid(plate, region, plate, 2, rubber, h)
+solid(ball, region, ball, 2, steel, h)
+region(rim, block, 2, INF, INF, INF)
+region(axis, block, -INF, 0, INF, INF)
+region(middle, block, 1 - h, 1 + h, 0.1, 0.3)
+group(rim, nodes, region, rim, all)
+group(axis, nodes, region, axis, all)
+group(middle, particles, region, middle, solid, plate)
+fix(clamp, velocity_nodes, rim, 0, 0)
+fix(axis, velocity_nodes, axis, 0, NULL)
+fix(b, rigid_body, ball, gravity=(0, -100*min(time/0.2, 1)), mass=100/PI)
+compute(mid, center_of_mass, middle)
+deflection = 0.2 - mid_y
+set_output(20)
+log_modify(custom, step, time, deflection, b_fy, clamp_y)
+"""
+
+
+def sags(w, E=1e7, nu=0.3, a=2.0, H=0.4, P=2e4):
+    """Compare with a clamped plate, bending and shear, at half its radius (Timoshenko 1959)."""
+    D, half = E * H**3 / (12 * (1 - nu**2)), a / 2
+    bends = P / (16 * np.pi * D) * (a**2 - half**2 * (1 + 2 * np.log(2)))
+    return w / (bends + P * np.log(2) / (2 * np.pi * 5 / 6 * E / (2 * (1 + nu)) * H))
+
+
+@pytest.mark.parametrize("refine", [0.5, pytest.param(1, marks=FULL)])
+def test_a_heavy_ball_on_a_clamped_plate_in_one_load_step(run_interpreted, run_script, refine):
+    """2 and 4 cells through the plate: 1.044 and 1.000 of the deflection."""
+    method = "scheme(quasi-static)\nmethod(ulmpm/contacts, FLIP, quadratic-spline, 1)"
+    text = (
+        f"h = 0.1/{refine}" + PLATE.format(method=method, law="linear") + "set_dt(1)\nrun_time(1)"
+    )
+    log = (run_interpreted if refine < 1 else run_script)(text).log
+    assert sags(log.deflection[-1]) == pytest.approx(1, abs=0.05 if refine < 1 else 0.01)
+    assert [log.b_fy[-1], log.clamp_y[-1]] == pytest.approx([1e4 / np.pi] * 2, rel=1e-8)
+
+
+@FULL
+@pytest.mark.parametrize(
+    ("basis", "refine", "within"),
+    [("quadratic-spline", 0.5, 0.02), ("quadratic-spline", 1, 0.02), ("linear", 2, 0.03)],
+)
+def test_a_heavy_ball_comes_to_rest_on_a_clamped_plate(run_script, basis, refine, within):
+    text = PLATE.format(method=f"method(tlmpm, FLIP, {basis}, 1)", law="neo-hookean")
+    text += "fix(touch, contact/rigid_body, all, ball, 0)\nfix(calm, local_damping, all, 0.3)\n"
+    log = run_script(f"h = 0.1/{refine}" + text + "run_time(2)").log
+    assert sags(log.deflection[-1]) == pytest.approx(1, abs=within)
+    assert late(log, "b_fy", 0.9) == pytest.approx(1e4 / np.pi, rel=0.01)
+    assert log.clamp_y[-1] == pytest.approx(1e4 / np.pi, rel=0.001)
+
+
 @pytest.mark.parametrize(
     ("change", "within"),
     [

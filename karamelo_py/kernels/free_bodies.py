@@ -158,6 +158,8 @@ def _list_point(body, surface, s, block, contact):
     fraction = SOFT * dt * times.kick / (times.contact_dt * times.contact_kick)
     contact.share = min(deep * deep * fraction, 1.0)
     contact.most, contact.face, contact.limit = 0.0, face(kin, volume, x), inf
+    if kin.hoops:  # the area is on the surface, not at the radius of the point
+        contact.face *= max(1 + within * normal[0] / x[0], 0.0) if x[0] > 0 else 1.0
     contact.number = number
     for c in range(3):
         contact.local[c] = local[c]

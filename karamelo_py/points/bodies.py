@@ -127,7 +127,7 @@ def _force_between_springs(law, kin, pair):
     reduced, both = mass1 * mass2 / (mass1 + mass2), radius1 + radius2
     p = both - pair.r
     most = 1 / (pair.dt * pair.kick)
-    push = law.rate * p + max(most - law.rate, 0.0) * max(p - DEEP * both, 0.0)
+    push = min(law.rate, most) * p + max(most - law.rate, 0.0) * max(p - DEEP * both, 0.0)
     return -reduced * push / pair.r * pair.dx, reduced * most
 
 

@@ -65,6 +65,21 @@ class PairContact(Gripping):
         self._ranges = (*ranges[0], *ranges[1])
         self._reach = max(solid.h for solid in self.solids)
 
+    def defined(self) -> None:
+        for other in self.hub.fixes.values():
+            same = isinstance(other, PairContact) and set(other.solids) == set(self.solids)
+            if same and other is not self:
+                first, second = other.solids
+                raise ScriptError(
+                    f"fix '{other.id}' (line {other.mark.line}) is the contact of '{first.id}' and "
+                    f"'{second.id}' already, and forces of both would add up",
+                    argument="solid2",
+                    expected="one contact for each pair of solids",
+                    hint=f"delete_fix({other.id}) before this line, or the ID {other.id} here",
+                    mark=self.mark,
+                    command=f"fix {self.style}",
+                )
+
     def law(self) -> NamedTuple:
         """Return the tag of the force law between two points (:mod:`karamelo_py.points.bodies`).
 
@@ -187,7 +202,7 @@ class ContactMinimizePenetration(PairContact):
         Coefficient of friction (Coulomb).
     stiffness
         Stiffness of the contact per area, over the stiffness rho c^2 / h of a cell (c: speed of
-        P waves). Without it, contact is as stiff as the step allows.
+        P waves), at most what the step allows, which is the stiffness without this argument.
 
     Example
     -------
