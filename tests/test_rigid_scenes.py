@@ -196,6 +196,24 @@ def test_a_sphere_heaves(run_script, refine, period):
         assert zeros[2] - zeros[0] == pytest.approx(5.609 - 1.152, rel=period)
 
 
+@FULL
+def test_bodies_float_on_points_of_water(run_script):
+    """Period of NREL in IEA OES Task 10 (Wendt et al. 2017), and Archimedes."""
+    logs = {}
+    for name, group in (("heave", "water, ball"), ("floating", "all, box")):
+        text = (INPUTS / f"in.{name}").read_text("utf-8").replace("ulmpm/contacts", "ulmpm")
+        text = text.replace(", ContactForce_water_y", "")
+        text = text.replace("set_output", f"fix(touch, contact/rigid_body, {group}, 0)\nset_output")
+        logs[name] = run_script(text, folder=name).log
+    log = logs["heave"]
+    zeros = log.Time[np.flatnonzero(np.diff(np.sign(log.heave)))]
+    assert zeros[2] - zeros[0] == pytest.approx(5.609 - 1.152, rel=0.1)
+    log = logs["floating"]
+    depth = 1.48 - log.b_y[log.Time > log.Time[-1] / 2].mean()
+    assert depth / 0.7 == pytest.approx(0.48, rel=0.15)
+    assert depth / 0.7 > 0.48 * 1.02  # not yet a contact for liquids, as the page says
+
+
 @pytest.mark.parametrize("refine", [1, pytest.param(1.5, marks=FULL)])
 def test_a_projectile_goes_through_a_plate(run_script, refine):
     """181.1 m/s remain (Borvik et al. 2002, unconfirmed), and of 350 what Recht & Ipson say."""
