@@ -39,7 +39,8 @@ class ContactSolids(PairContact):
 
     Notes
     -----
-    Publishes the force on solid1 as ID_x, ID_y, ID_z; the force on solid2 is the opposite.
+    Publishes the force on solid1 as ID_x, ID_y, ID_z in one step; that on solid2 is the opposite.
+    Bodies bounce, so take the mean over many steps.
 
     A point next to the surface of its region has a face: the tangent plane of the region at the
     nearest place, as wide as the distance to the next points along the surface. Faces follow the
@@ -77,8 +78,7 @@ class ContactSolids(PairContact):
         super().__init__(hub, solid1, solid2)
         self.rubs(hub, float(mu or 0.0))
         self._reach = inf
-        names = ("solid1", "solid2")
-        self._faces = np.concatenate([*map(faces_of, self.solids, names)])
+        self._faces = np.concatenate([*map(faces_of, self.solids, ("solid1", "solid2"))])
 
     def law(self) -> MeetingFaces:
         return MeetingFaces(self.mu)
@@ -110,14 +110,12 @@ def faces_of(solid: Solid, argument: str) -> np.ndarray:
     n, d = x.shape
     reach = 2 * float(size.max())
 
-    def slope(x: np.ndarray, k: int) -> np.ndarray:
-        step = np.zeros((n, d))
-        step[:, k] = STEP * size[:, k]
-        ends = (region.depth(x + way * step, reach) for way in (1, -1))
-        return np.subtract(*ends) / (2 * step[:, k])
-
     def outward(x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        inward = np.stack([slope(x, k) for k in range(d)], axis=1)
+        inward = np.empty((n, d))
+        for k, axis in enumerate(np.eye(d)):
+            step = STEP * size * axis
+            ends = (region.depth(x + way * step, reach) for way in (1, -1))
+            inward[:, k] = np.subtract(*ends) / (2 * step[:, k])
         steep = np.maximum(np.linalg.norm(inward, axis=1), TINY)
         return -inward / steep[:, None], steep
 
@@ -144,7 +142,6 @@ def tangents(normal: np.ndarray) -> list[np.ndarray]:
     d = normal.shape[1]
     if d < 3:
         return [normal[:, ::-1] * (1, -1)] * (d - 1)
-    axis = np.eye(3)[abs(normal).argmin(axis=1)]
-    one = np.cross(normal, axis)
+    one = np.cross(normal, np.eye(3)[abs(normal).argmin(axis=1)])
     one /= np.linalg.norm(one, axis=1)[:, None]
     return [one, np.cross(normal, one)]
