@@ -115,7 +115,7 @@ def _force_between_faces(law, kin, pair):
     common = min(0.5 * (face1.wide + face2.wide) - aside, narrow)
     touching = facing and 0 < p < narrow and common > 0
     # The widths of a body's faces add up to its surface, so the forces on a face do not depend on
-    # how its points are opposite the points of the other body (in 3D they vary by up to 4 %).
+    # how its points are opposite the points of the other body (in 3D by 4 % for equal widths).
     part = common / (narrow if narrow > 0 else 1.0)
     part *= 1 - (SQUARE * (1 - part) * (0.5 - part) if kin.dimension == 3 else 0.0)
     reduced = part * mass1 * mass2 / (mass1 + mass2)
