@@ -25,6 +25,7 @@ from karamelo_py.compiler.code.builder import Builder
 from karamelo_py.compiler.disk import cache
 from karamelo_py.compiler.llvm import I32, I64
 from karamelo_py.compiler.trace.choices import INTERPRETED, modules_noted, modules_of, note
+from karamelo_py.compiler.trace.held import text_with_types
 from karamelo_py.compiler.trace.kernels import ENTRY, NAME, compilation, items_at, written
 from karamelo_py.compiler.trace.primitives import implements
 from karamelo_py.compiler.trace.session import session
@@ -174,7 +175,7 @@ def text_of(
         module, _ = written(function, (types.int64, *kinds), types.none, entry)
     if module.needs or module.raises:
         raise TypeError(f"{function.__qualname__} calls a function that threads cannot call")
-    text = str(module)
+    text = text_with_types(module)
     if on_card:
         outside = [f.name for f in module.functions if not f.blocks]
         for other, replacement in [(f, _of_nvidia(f)) for f in outside]:

@@ -95,7 +95,7 @@ class NoLinks(NamedTuple):
 class Links(NamedTuple):
     """Links, and the state of B bodies and one fixed body."""
 
-    touches: tuple[Meeting, ...]
+    touches: tuple[tuple[Meeting, ...], ...]  # by the kinds of their shapes
     joints: np.ndarray  # (k,) JOINT
     published: np.ndarray  # (k, 2) indices of published forces and torques
     rows: np.ndarray  # (n,) LINK
@@ -730,8 +730,9 @@ def find(links, bodies, control, kin):
                 values[links.published[i, 1] + c] = 0.0
     for n, body in enumerate(bodies):
         _begin(links, body, n)
-    for touch in links.touches:
-        _list_touch(links, touch, kin, dt)
+    for alike in links.touches:
+        for touch in alike:
+            _list_touch(links, touch, kin, dt)
     for i in range(links.joints.size):
         _list_joint(links, links.joints[i], dt, control.step[0].kick)
     return links.count[0] > 0

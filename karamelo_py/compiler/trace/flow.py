@@ -43,6 +43,15 @@ class Range:
         raise Untraceable("the end of a range is only known when the kernel runs")
 
 
+class Numbered(NamedTuple):
+    """Items of a tuple with their numbers."""
+
+    items: HeldValue
+
+    def __iter__(self) -> Any:
+        return enumerate(self.items)
+
+
 class Counter(NamedTuple):
     start: Value
     goes_on: Callable[[Value], Value]
@@ -284,6 +293,8 @@ class Flow:
             return emit(len, arguments[0])
         if function is range and any(map(is_value, arguments)):
             return Range(*arguments)
+        if function is enumerate and len(arguments) == 1 and isinstance(arguments[0], HeldValue):
+            return Numbered(arguments[0])
         if isinstance(function, python.MethodType) and isinstance(function.__self__, tuple):
             plain = function.__func__
             if plain.__name__[0] != "_" and not hasattr(function, "__wrapped__"):

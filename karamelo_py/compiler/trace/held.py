@@ -6,6 +6,7 @@ in memory, and kernels get a pointer to the tuple. The type of the tuple is stil
 """
 
 import hashlib
+import re
 from collections.abc import Iterable, Iterator
 from typing import Any
 
@@ -14,6 +15,7 @@ from numba import types
 
 from karamelo_py.compiler import llvm
 from karamelo_py.compiler.trace.choices import tag_class
+from karamelo_py.compiler.trace.session import session
 from karamelo_py.compiler.trace.values import HeldValue, builtin
 
 
@@ -22,6 +24,37 @@ def _words(kind: Any) -> str:
         tag = tag_class(kind) or tuple
         return f"{tag.__module__}.{tag.__qualname__}({', '.join(map(_words, kind))})"
     return str(kind)
+
+
+class Struct(ir.LiteralStructType):
+    """A struct that the text of a module names, so that the text of instructions is short."""
+
+    def __init__(self, name: str, elements: Iterable):
+        self.name = name
+        super().__init__(elements)
+
+    def _to_string(self) -> str:
+        return self.name
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, Struct) and self.name == other.name
+
+    __hash__ = ir.LiteralStructType.__hash__
+
+
+def text_with_types(module: ir.Module) -> str:
+    """Return the text of a module, with the types that it names."""
+    text = str(module)
+    names, declared = set(_NAME.findall(text)), {}
+    while names:
+        name = names.pop()
+        declared[name] = session.structs[name].structure_repr()
+        names |= set(_NAME.findall(declared[name])) - declared.keys()
+    head, blank, body = text.partition("\n\n")
+    return "\n".join([head, *(f"{k} = type {declared[k]}" for k in sorted(declared)), blank + body])
+
+
+_NAME = re.compile(r"%T\.[0-9a-f]{16}")
 
 
 class HeldTuple(types.BaseTuple):
@@ -37,14 +70,18 @@ class HeldTuple(types.BaseTuple):
             word = f"{instance_class.__module__}.{instance_class.__qualname__}"
         text = f"{word}({', '.join(map(_words, items))})"
         # The hash is short, as it is part of function names.
-        super().__init__(f"Held{word}_{hashlib.sha256(text.encode()).hexdigest()[:16]}")
+        self.hash = hashlib.sha256(text.encode()).hexdigest()[:16]
+        super().__init__(f"Held{word}_{self.hash}")
 
     @property
     def key(self):
         return self.instance_class, self.types
 
     def register_type(self) -> ir.Type:
-        return ir.LiteralStructType(map(llvm.memory_type, self.types)).as_pointer()
+        name = f"%T.{self.hash}"
+        if name not in session.structs:
+            session.structs[name] = Struct(name, map(llvm.memory_type, self.types))
+        return session.structs[name].as_pointer()
 
     def __getitem__(self, k: int) -> types.Type:
         return self.types[k]
@@ -96,6 +133,12 @@ def held_as(lowering: Any, things: Iterable, kind_of_tuple: HeldTuple) -> HeldVa
 
 def item_of(builder: ir.IRBuilder, kind: HeldTuple, pointer: ir.Value, k: int) -> ir.Value:
     return llvm.get(builder, kind[k], llvm.at(builder, pointer, 0, k))
+
+
+def item_at(builder: ir.IRBuilder, kind: HeldTuple, pointer: ir.Value, k: ir.Value) -> ir.Value:
+    """Return an item of a tuple of alike items, whose number is only known at run time."""
+    items = builder.bitcast(pointer, llvm.memory_type(kind[0]).as_pointer())
+    return llvm.get(builder, kind[0], builder.gep(items, [k]))
 
 
 def at_hand(value: Any) -> Any:

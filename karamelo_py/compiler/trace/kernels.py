@@ -24,7 +24,7 @@ from karamelo_py.compiler.code.exceptions import Failure, failure_at, noting
 from karamelo_py.compiler.disk import cache, lock
 from karamelo_py.compiler.trace import choices
 from karamelo_py.compiler.trace.functions import call_own, chosen, not_inlined, write_into
-from karamelo_py.compiler.trace.held import HeldTuple, hold, item_of
+from karamelo_py.compiler.trace.held import HeldTuple, hold, item_of, text_with_types
 from karamelo_py.compiler.trace.lowering import function_type, new_function
 from karamelo_py.compiler.trace.primitives import shared
 from karamelo_py.compiler.trace.session import one_at_a_time, session
@@ -134,7 +134,7 @@ def _compiled(function: Callable, kinds: tuple, result: types.Type | None) -> Un
     with compilation(function.__name__), _no_collections(), choices.modules_noted() as modules:
         choices.note(choices.modules_of(function))
         module, result = written(function, kinds, result)
-        text = str(module)
+        text = text_with_types(module)
         readable = re.sub(r"[^\w.]", "_", function.__qualname__, flags=re.ASCII)
         name = f"{readable}.{cache.short_hash(text, machine.describe())}"
         made = cache.machine_code(name, lambda: machine.compile_text(text.replace(NAME, name)))

@@ -17,7 +17,7 @@ from karamelo_py.compiler.trace import indexing
 from karamelo_py.compiler.trace import values as traced
 from karamelo_py.compiler.trace.choices import tag_class
 from karamelo_py.compiler.trace.flow import Flow
-from karamelo_py.compiler.trace.held import HeldTuple, item_of
+from karamelo_py.compiler.trace.held import HeldTuple, item_at, item_of
 from karamelo_py.compiler.trace.session import session
 
 MOST_OPERATIONS = 100_000  # largest number in a function; more operations should be a loop
@@ -192,6 +192,11 @@ class Lowering:
             value = item_of(self.builder, parent._kind, parent._value, k)
             self.read[key] = self.wrapped(parent._kind[k], value), parent  # its id stays unique
         return self.read[key][0]
+
+    def item_at(self, parent: traced.HeldValue, k: Any) -> Any:
+        number = self.lowered(k, types.int64)
+        value = item_at(self.builder, parent._kind, parent._value, number)
+        return self.wrapped(parent._kind[0], value)
 
     def function(self, name: str, run: Callable, kinds: tuple, result: Any = None) -> ir.Function:
         """Return the module's separate function for `run`, whose result type is `result`."""

@@ -24,6 +24,7 @@ class Session:
         self.functions: dict[tuple, Any] = {}  # functions selected by argument types
         self.operations: dict[tuple, Any] = {}
         self.tuples: dict[tuple, Any] = {}  # tuple types by class and type numbers of items
+        self.structs: dict[str, Any] = {}  # types of held tuples in memory, by name
         self.outdated = False  # whether functions have to be selected again
         self.changes = 0  # number of implementations that have changed and that kernels may contain
         self.loaded: dict[str, list[int]] = {}  # addresses by kernel name

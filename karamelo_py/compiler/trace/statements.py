@@ -25,8 +25,8 @@ from numba import types
 from karamelo_py.compiler.code import exceptions
 from karamelo_py.compiler.trace import values
 from karamelo_py.compiler.trace.choices import codes_in
-from karamelo_py.compiler.trace.flow import Edge, Flow, Grows, Range, is_value
-from karamelo_py.compiler.trace.values import LONG, Untraceable, emit
+from karamelo_py.compiler.trace.flow import Edge, Flow, Grows, Numbered, Range, is_value
+from karamelo_py.compiler.trace.values import LONG, HeldValue, Untraceable, emit
 
 
 @functools.cache
@@ -586,8 +586,16 @@ class AstCompiler:
 
     def For(self, node: ast.For) -> None:
         through = self.do(node.iter)
-        if isinstance(through, range) and len(through) > LONG and self.rolls(node, through):
-            return
+        if isinstance(through, range) and len(through) > LONG:
+            bounds = through.start, through.stop, through.step
+            if self.rolls(node, bounds, lambda k: k):
+                return
+        items = through.items if isinstance(through, Numbered) else through
+        if isinstance(items, HeldValue) and len(items) > ALIKE and len(set(items._kind)) == 1:
+            at, numbered = self.flow.lowering.item_at, isinstance(through, Numbered)
+            one = (lambda k: (k, at(items, k))) if numbered else lambda k: at(items, k)
+            if self.rolls(node, (len(items),), one):
+                return
         if is_value(through):
             self.roll(node, (through.shape[0],), lambda k: through[k])
         elif isinstance(through, Range):
@@ -595,14 +603,14 @@ class AstCompiler:
         else:
             self.unroll(node, through)
 
-    def rolls(self, node: ast.For, through: range) -> bool:
-        """Compile a loop over a long known range as a loop; return False if that is impossible."""
+    def rolls(self, node: ast.For, bounds: tuple, item: Callable) -> bool:
+        """Compile a loop over a known range as a loop; return False if that is impossible."""
         loops, key = self.walked.loops, (node, _shape((self.names, self.free)))
         if loops.get(key, {}) is None:
             return False
         go_back = self.state()
         try:
-            self.roll(node, (through.start, through.stop, through.step), lambda k: k)
+            self.roll(node, bounds, item)
         except (Exception, Untraceable):
             go_back()
             loops[key] = None
@@ -699,5 +707,6 @@ class AstCompiler:
 
 
 _COMPILED = {getattr(ast, n): f for n, f in vars(AstCompiler).items() if n in vars(ast)}
+ALIKE = 2  # alike items of a held tuple up to which a loop over them is unrolled
 LONGEST = 1000  # longest range in a comprehension
 _COUNT = "for"  # no function has this name

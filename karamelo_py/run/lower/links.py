@@ -9,6 +9,7 @@ from karamelo_py.kernels import rigid_links as kernel
 from karamelo_py.kernels import rigid_motion as motion
 from karamelo_py.kernels.arrays import Tag
 from karamelo_py.kernels.surfaces import Convex, HalfSpace, Outside, Surface
+from karamelo_py.points.laws import law_kind
 from karamelo_py.scene.hub import Hub
 from karamelo_py.scene.modify import Fix
 from karamelo_py.scene.region import Region
@@ -66,13 +67,21 @@ def lower_links(hub: Hub, moving: Sequence[RigidBody]) -> kernel.NoLinks | kerne
     m = int(ways.sum())
     published = [hub.values.slot(f"{fix.id}_x") for fix in (*touching, *joined)]
     return kernel.Links(
-        tuple(touches), _joints(hub, joined, of_solid, constants),
+        _by_kind(touches), _joints(hub, joined, of_solid, constants),
         np.array([(slot, int(hub.values.torques[slot])) for slot in published]),
         motion.records(kernel.LINK, min(rows, MOST) + 2 * len(joined)),
         np.zeros(1, np.int64), np.zeros(1),
         states, constants, free, *(np.zeros((count + 1, 6)) for _ in range(7)),
         np.zeros((count + 1, 6, 6)), np.zeros((m, m + 1)), np.zeros((2, 3, 6)), np.zeros((3, 4)),
     )  # fmt: skip
+
+
+def _by_kind(touches: Sequence[kernel.Meeting]) -> tuple[tuple[kernel.Meeting, ...], ...]:
+    """Group meetings by the kinds of their shapes, as kernels loop over alike ones."""
+    groups: dict[tuple, list[kernel.Meeting]] = {}
+    for touch in touches:
+        groups.setdefault(law_kind(touch), []).append(touch)
+    return tuple(map(tuple, groups.values()))
 
 
 def _refuse(fix: ContactBodies | Joint, moving: Sequence[RigidBody]) -> None:
