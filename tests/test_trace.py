@@ -23,6 +23,7 @@ from karamelo_py.compiler import (
     where,
 )
 from karamelo_py.compiler.trace.functions import forget
+from karamelo_py.compiler.trace.held import held_type, text_with_types
 from karamelo_py.compiler.trace.kernels import written
 from karamelo_py.compiler.trace.lowering import Lowering
 from karamelo_py.compiler.trace.values import in_one
@@ -453,3 +454,32 @@ def _size_of_empty(tag):
 def sized(tag, x):
     """As many x."""
     return sum([x] * size_of(tag))
+
+
+class Half(NamedTuple):
+    x: np.ndarray
+
+
+class Many(NamedTuple):
+    halves: tuple
+    out: np.ndarray
+
+
+@kernel
+def _sum_halves(many):
+    for k, half in enumerate(many.halves):
+        for other in many.halves:
+            many.out[0] += (1 + k) * half.x[0] + other.x[0]
+
+
+def test_a_loop_over_many_alike_tuples_remains_a_loop():
+    lengths = []
+    for count in (3, 40):
+        many = hold(Many(tuple(Half(np.array([float(k)])) for k in range(count)), np.zeros(1)))
+        _sum_halves(many)
+        x = np.arange(count)
+        assert many.out[0] == count * ((1 + x) * x).sum() + count * x.sum()
+        kinds = (held_type(typeof(many)),)
+        text = text_with_types(written(_sum_halves.function, kinds)[0])
+        lengths.append(len(text.split("define")[1].splitlines()))
+    assert lengths[0] == lengths[1]
