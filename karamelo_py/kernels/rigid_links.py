@@ -207,15 +207,15 @@ def _relative(links, link, u, k):
 @noinline
 def _set_weight(links, link):
     """Set W = A M^-1 A^T + B M^-1 B^T, the change of relative velocity per impulse."""
-    W = links.weight
-    for k in range(3):
-        for j in range(3):
+    W, (sides, rows, columns) = links.weight, links.jacobian.shape  # loops are not unrolled
+    for k in range(rows):
+        for j in range(rows):
             total = 0.0
-            for side in range(2):
+            for side in range(sides):
                 A = links.jacobian[side]
                 inverse = links.inverse[link.first if side == 0 else link.second]
-                for a in range(6):
-                    for b in range(6 if A[k, a] != 0 else 0):
+                for a in range(columns):
+                    for b in range(columns if A[k, a] != 0 else 0):
                         total += A[k, a] * inverse[a, b] * A[j, b]
             W[k, j] = total
 
@@ -233,13 +233,14 @@ def _along(links, a, b):
 @noinline
 def _give(links, link, p, into, by_mass):
     """Add impulse `p` of a link to (B + 1, 6) impulses, or its velocity changes if `by_mass`."""
-    for side in range(2):
+    sides, rows, columns = links.jacobian.shape
+    for side in range(sides):
         A, body = links.jacobian[side], link.first if side == 0 else link.second
         sign = 1.0 if side == 0 else -1.0
-        for a in range(6):
-            for k in range(3):
+        for a in range(columns):
+            for k in range(rows):
                 if by_mass:
-                    for b in range(6):
+                    for b in range(columns):
                         into[body, a] += sign * links.inverse[body, a, b] * A[k, b] * p[k]
                 else:
                     into[body, a] += sign * A[k, a] * p[k]
@@ -251,10 +252,10 @@ def _begin(links, body, k):
     links.states[k].x[:], links.states[k].R[:] = state.x, state.R
     links.old[k, :3], links.old[k, 3:] = state.v, state.spin
     links.u[k] = work.u
-    for c in range(6):
-        J = work.slope
-        for a in range(6):
-            for b in range(6):
+    J, size = work.slope, work.slope.shape[0]
+    for c in range(size):
+        for a in range(size):
+            for b in range(size):
                 both = body.dofs[a] and body.dofs[b]
                 J[a, b] = work.mass[a, b] if both else (1.0 if a == b else 0.0)
             J[a, 6] = 1.0 if a == c and body.dofs[a] else 0.0
@@ -460,20 +461,21 @@ def _slope_of(link, k, j, bounded):
 @noinline
 def _add_slope(links, link, bounded):
     _set_jacobians(links, link)
-    for k in range(3):
-        for j in range(3):
+    sides, rows, columns = links.jacobian.shape
+    for k in range(rows):
+        for j in range(rows):
             slope = _slope_of(link, k, j, bounded)
             if slope == 0:
                 continue
-            for side in range(2):
+            for side in range(sides):
                 row = links.free[link.first if side == 0 else link.second]
-                for other in range(2):
+                for other in range(sides):
                     column = links.free[link.first if other == 0 else link.second]
                     sign = slope if side == other else -slope
-                    for a in range(6):
+                    for a in range(columns):
                         if row[a] < 0 or links.jacobian[side, k, a] == 0:
                             continue
-                        for b in range(6):
+                        for b in range(columns):
                             if column[b] >= 0:
                                 links.slope[row[a], column[b]] += (
                                     sign * links.jacobian[side, k, a] * links.jacobian[other, j, b]
@@ -504,12 +506,12 @@ def _add_body(links, body, n, bounded):
     J[:, :6] = work.mass
     for i in range(body.count[0]):
         motion.add_slope(body, i, bounded)
-    m = links.slope.shape[0]
-    for a in range(6):
+    m, size = links.slope.shape[0], links.free.shape[1]
+    for a in range(size):
         row = links.free[n, a]
         if row >= 0:
             links.slope[row, m] = links.rest[n, a]
-            for b in range(6):
+            for b in range(size):
                 if links.free[n, b] >= 0:
                     links.slope[row, links.free[n, b]] += J[a, b]
 

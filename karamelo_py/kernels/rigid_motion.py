@@ -319,9 +319,10 @@ def residual(body, dt, u, rest, bounded):
         for k in range(3):
             for a in _columns(k):
                 total[a] += work.jacobian[k, a] * body.contacts[i].impulse[k]
-    for a in range(6):
+    size = M.shape[0]
+    for a in range(size):
         rest[a] = total[a] - work.momentum[a]
-        for b in range(6):
+        for b in range(size):
             rest[a] += M[a, b] * u[b]
         if body.dofs[a]:
             square += rest[a] * rest[a] / M[a, a]
@@ -480,9 +481,9 @@ def start_step(body, control):
 def _velocities_of(body, momentum):
     """Solve M U = P for the free components of U; the others are prescribed."""
     work = body.solution
-    M, J = work.mass, work.slope
-    for a in range(6):
-        for b in range(6):
+    M, J, size = work.mass, work.slope, work.mass.shape[0]
+    for a in range(size):
+        for b in range(size):
             J[a, b] = M[a, b] if body.dofs[a] else (1.0 if a == b else 0.0)
         J[a, 6] = momentum[a] if body.dofs[a] else work.u[a]
     solve_system(J)
