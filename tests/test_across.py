@@ -150,4 +150,4 @@ def test_what_cannot_run_is_refused(run_interpreted, ezz, law, says):
 def test_points_that_enter_late_and_gpus_are_refused(run_interpreted):
     late = block() + "solid(t, region, all, 2, m, 0.5)\n"
     assert "after a run would get all of ezz" in run_interpreted(late, status=1).err
-    assert "does not support --gpu" in run_interpreted(block(), "--gpu", status=1).err
+    assert "no --gpu" in run_interpreted(block(), "--gpu", status=1).err

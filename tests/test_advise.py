@@ -98,7 +98,7 @@ def test_a_script_states_the_target_and_set_ups_are_compared(folder, capsys):
     ("accuracy", "said"),
     [
         ("", "there is no largest error"),
-        (", accuracy=2", "between 0 and 1, both excluded or NULL, not 2"),
+        (", accuracy=2", "between 0 and 1, both excluded, not 2"),
     ],
 )
 def test_no_target_and_a_wrong_one(folder, capsys, accuracy, said):

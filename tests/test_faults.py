@@ -88,7 +88,7 @@ def test_init(hub):
         ("many", "post_particles_to_grid: too_few has to take the one argument of a hook on nodes"),
         ("few", "initial_integrate: <lambda> has to return 3 numbers, not (1.0, 1.0)"),
         ("heavily",
-         "initial_integrate reads 'weight': 'mass', 'velocity', 'position', 'volume', a"),
+         "initial_integrate reads 'weight': 'mass', 'velocity', 'position', 'volume', 'face'"),
         ("fixing", "initial_integrate writes 'mass': 'velocity' or a class of a field"),
         ("homeless", "initial_integrate: points have no Force because of this fix: its author nam"),
         ("late", "final_integrate: forces on points are set in initial_integrate"),

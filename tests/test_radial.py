@@ -264,7 +264,7 @@ LINE = "dimension(1, 0, 1, 0.1)\n"
     ("lines", "says"),
     [
         ("dimension(2, 0, 1, 0, 1, 0.1)\nspherical(true)", "axisymmetric(true)"),
-        ("dimension(3, 0, 1, 0, 1, 0, 1, 0.1)\ncylindrical(true)", "not 3"),
+        ("dimension(3, 0, 1, 0, 1, 0, 1, 0.1)\ncylindrical(true)", "must have one: the radius"),
         (LINE + "axisymmetric(true)", "spherical(true)"),
         ("dimension(1, -1, 1, 0.1)\nspherical(true)", "x is a radius"),
         (LINE + "uniaxial_stress(true)\nspherical(true)", "uniaxial_stress(false)"),

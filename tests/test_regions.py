@@ -167,7 +167,7 @@ def test_axisymmetric():
     hub = SmallHub(2, 0, 1, 0.1)
     revolution.axisymmetric(hub, True)
     assert hub.domain.kin.hoops
-    with pytest.raises(ScriptError, match="two dimensions"):
+    with pytest.raises(ScriptError, match="3 dimensions, but must have two"):
         revolution.axisymmetric(SmallHub(3, 0, 1, 0.1), True)
 
 

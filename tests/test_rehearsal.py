@@ -89,7 +89,7 @@ CALLS = {
     "precision": (SCENE, "precision(single)"),
     "print": (SCENE, "print(E)"),
     "quit": (SCENE, "quit()"),
-    "read_restart": (SCENE, "read_restart(nothing.h5)"),
+    "read_restart": (SCENE, "read_restart(settled.h5)"),
     "region": (SCENE, "region(other, block, 0, 1, 0, 1)"),
     "restart": (SCENE, "restart(5, r.*.h5)"),
     "run": (SCENE, "run(5)\nscheme(usl)\nrun(5)"),
@@ -165,10 +165,17 @@ def test_all_commands_are_here():
     assert set(CALLS) == set(registry.names("command"))
 
 
+def write_files(name):
+    """Write the files that commands read."""
+    Path("more.in").write_text("fix(more, body_force, all, 0, -1)\n")
+    if name == "read_restart":
+        Interpreter(Hub(Console(quiet=True))).run_text(f"{SCENE}\nwrite_restart(settled.h5)")
+
+
 @pytest.mark.parametrize("name", CALLS)
 def test_no_command_changes_the_scene_in_a_rehearsal(name, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
-    Path("more.in").write_text("fix(more, body_force, all, 0, -1)\n")
+    write_files(name)
     before, call = CALLS[name]
     old, new = rehearse("element(e, rubber, pull)", before, call)
     assert old == new
@@ -177,7 +184,7 @@ def test_no_command_changes_the_scene_in_a_rehearsal(name, tmp_path, monkeypatch
 @pytest.mark.parametrize("name", [name for name in CALLS if CALLS[name][0] is SCENE])
 def test_no_command_changes_the_scene_before_a_run(name, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
-    Path("more.in").write_text("fix(more, body_force, all, 0, -1)\n")
+    write_files(name)
     before, call = CALLS[name]
     if name in ONLY_BEFORE_RUNS:
         with pytest.raises(ScriptError, match=r"been in a run|after the first run"):

@@ -6,7 +6,7 @@ import numpy as np
 
 from karamelo_py.script.errors import ScriptError
 
-CAPACITY = 4096
+CAPACITY = 2048
 TIME, TIMESTEP, DT = 0, 1, 2
 SUFFIXES = ("x", "y", "z", "s", "")
 
