@@ -169,7 +169,7 @@ def test_affine_transfers_give_their_angular_momentum_whole(transfer, basis, kin
     assert momentum.T @ met.arms == pytest.approx(2.5 * np.reshape(moment, (d, d)), abs=1e-11)
 
 
-def test_steps_with_polypic_are_held(run_interpreted):
+def test_steps_with_polypic_are_held(run_script):
     """In a large vibration, a step of 0.9 h/c that follows the strain gains 1000 % in 5000 steps.
 
     Leapfrog conserves energy with equal steps only (Skeel & Gear 1992). A lumped line of linear
@@ -190,7 +190,7 @@ set_output(10)
 log_modify(custom, step, dt, E)
 run(6000)
 """
-    found = run_interpreted(text)
+    found = run_script(text)
     E, dt = found.log.E, found.log.dt
     assert dt[0] == pytest.approx(0.9 / 16 / (1 + 0.1), rel=0.01)  # h/(c + v)
     assert np.ptp(dt[-300:]) == 0
