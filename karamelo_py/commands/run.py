@@ -123,6 +123,10 @@ def dt_factor(hub: Hub, factor: Annotated[float, Positive]) -> None:
 
 
 def _warn_of_factor(hub: Hub) -> None:
+    """Warn, unless method(auto) has written the factor."""
+    chosen = hub.update.chosen
+    if chosen is not None and f"dt_factor({hub.update.dt_factor:g})" in chosen.lines:
+        return
     hub.warn("dt_factor has no effect: set_dt fixes the step", hint="leave one of them out")
 
 

@@ -44,13 +44,14 @@ class StepPolicy(NamedTuple):
     def of(cls, hub: Hub) -> StepPolicy:
         update = hub.update
         fixed = update.fixed_dt or float(update.scheme.traits.implicit)  # implicit: 1 by default
+        release = RELEASE * update.transfer.traits.lossless
         if update.dt_factor is None and update.fixed_dt is None:
             still, moving = (own_step_of_waves(hub, still=still) for still in (True, False))
-            release = RELEASE * update.transfer.traits.lossless
             return cls(still, moving, own_weight_of_drift(hub), fixed, DEFAULT_FRACTION, release)
         # Fractions that scripts set refer to h/(c + |v|), even if the points are at rest.
         asked = courant_number(hub, longer=False), update.dt_factor or conserving_fraction(hub)
-        return cls(asked, asked, 1.0, fixed, update.dt_factor or DEFAULT_FRACTION)
+        release *= not fixed
+        return cls(asked, asked, 1.0, fixed, update.dt_factor or DEFAULT_FRACTION, release)
 
     def numbers(self, path: float, halvings: int) -> dict[str, float]:
         """Return clock fields for points whose longest path so far is `path`, in cells."""
@@ -66,20 +67,21 @@ class StepPolicy(NamedTuple):
         }
 
 
-Carried = tuple[float, float, float, float]
+Carried = tuple[float, float, float, float, float]
 
 
 def carried_on(control: Control) -> Carried:
-    """Return last dt, contact dt, path and loss of deleted points, for the next lowering."""
+    """Return last dt, contact dt, held dt, path and loss of deleted points for a new lowering."""
     step, path, lost = control.step[0], control.motion[0].path, control.energy[0].lost_with_deleted
-    return float(step.last_dt), float(step.last_contact_dt), float(path), float(lost)
+    times = float(step.last_dt), float(step.last_contact_dt), float(step.held_dt)
+    return *times, float(path), float(lost)
 
 
 def set_up(control: Control, hub: Hub, transfer: Tag, last: Carried | None) -> None:
     """Set the clock of new arrays, continuing after the `last` steps."""
     step, heat = control.step[0], control.heat[0]
     if last is not None:
-        step.last_dt, step.last_contact_dt, control.motion[0].path, lost = last
+        step.last_dt, step.last_contact_dt, step.held_dt, control.motion[0].path, lost = last
         control.energy[0].lost_with_deleted = lost
     step.spacing = min(lattice.h for lattice in hub.lattices)
     heat.heat_limit = heat.heat_reference = stable_conduction(hub)
