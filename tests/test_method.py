@@ -239,6 +239,17 @@ def test_auto_by_the_scene(run_interpreted, material, more, lines):
         assert re.search("^method .* usavg( |$)", said, re.M)
 
 
+def test_a_step_set_in_a_resumed_run_replaces_the_factor_of_auto(run_interpreted):
+    """The script names one of both, so nothing is to leave out."""
+    gas = fluid("ideal-gas, 1, 1.4, p=1, Q1=0.1, Qh=3")
+    fast = "fix(v, initial_velocity_particles, all, 9, 0)\nrestart(1, r.*.h5)"
+    text = AUTO.format(d=2, domain="0, 2, 0, 1", box="0, 0.2, 0, 0.2", material=gas, more=fast)
+    run_interpreted(text.replace("run(10)", "run(1)"))
+    text = text.replace("run(10)", "set_dt(1e-5)\nrun(2)")
+    result = run_interpreted(text, "-restart", "r.1.h5")
+    assert "dt_factor(0.6)" in result.out and "no effect" not in result.err
+
+
 def test_auto_leaves_what_the_script_names(run_interpreted):
     """A scheme of the script remains, and a mistake after method(auto) is reported at its line."""
     text = AUTO.format(d=1, domain="0, 1", box="0, 0.5", material=RUBBER, more="scheme(musl)")
