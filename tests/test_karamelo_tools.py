@@ -210,6 +210,26 @@ def test_compiled_tools_exert_the_same_forces(run_script, run_interpreted, d, to
     assert all(np.abs(compiled[name]).max() > 0 for name in compiled if name.endswith("_y"))
 
 
+def test_force_of_the_moduli_of_a_run(run_script):
+    """Solids after the fix count, as do moduli changed between runs, and damage of metals."""
+    script = block(
+        2,
+        "fix(F, impenetrablesurface, all, 0.5, 0, 0.35, 0, 0, 1, 0)",
+        "region(other, block, 0.7, 0.9, 0.3, 0.5)",
+        "eos(bulk, linear, 2, 100)",
+        "strength(steel, plastic, 40, 1e9)",
+        "damage(breaks, damage_johnson_cook, 1, 0, 0, 0, 0, 1, 300, 1000)",
+        "material(metal, eos-strength, bulk, steel, breaks)",
+        "solid(metal, region, other, 2, metal, 0.1)",
+        "set_dt(1e-4)", "set_output(1)", "log_modify(custom, step, F_y)", "run(1)",
+        "modify(material, rubber, E=200)", "run(1)",
+    )  # fmt: skip
+    rubber, metal = (0.5 * n * SIDE * 0.025 for n in (6, 4))
+    forces = run_script(script).log["F_y"]
+    assert forces[1] == pytest.approx(rubber * G + metal * 40, rel=1e-3)
+    assert forces[-1] == pytest.approx(rubber * 2 * G + metal * 40, rel=1e-2)
+
+
 def test_traction_around_an_axis(run_interpreted):
     """A pressure on the outer face acts at the radius of the points: t r dz per radian."""
     script = block(

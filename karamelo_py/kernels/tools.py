@@ -130,8 +130,8 @@ class ByModulus(NamedTuple):
     """Force K G p, times the side of the point if `by_side`; K is the first value."""
 
     by_side: bool
-    moduli: np.ndarray  # (S,) shear moduli of the solids
-    firsts: np.ndarray  # (S + 1,) ids of their first points
+    moduli: np.ndarray | None = None  # (S,) shear moduli of the solids
+    firsts: np.ndarray | None = None  # (S,) ids of their first points
 
 
 class Stiff(NamedTuple):
@@ -158,8 +158,9 @@ def damage_of(law, kin, state):
 
 @implements(damage_of, by_type=True)
 def _damage_of(law, kin, state):
-    known = defined_by(classes_in(law), damage)
-    return damage if known else lambda law, kin, state: 0.0
+    if defined_by(classes_in(law), damage):
+        return lambda law, kin, state: damage(law, kin, state)  # a point function needs a caller
+    return lambda law, kin, state: 0.0
 
 
 @point_function()

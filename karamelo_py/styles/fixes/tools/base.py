@@ -105,14 +105,13 @@ class ShapedTool(ToolFix):
         self.now(*numbers)  # raises ScriptError for formulas of position
         self.initial_integrate = press_hook(self._press)
 
-    def by_modulus(self, *, by_side: bool = False) -> ByModulus:
-        """Return a force proportional to the shear modulus of each solid."""
-        solids = list(self.hub.solids.values())
-        moduli = np.array([_shear_modulus(solid) for solid in solids])
-        return ByModulus(by_side, moduli, np.array([solid.first_id for solid in solids]))
-
     def _press(self, row: int, values: tuple) -> Press:
-        return press_kind(self.kind_of_press, self.grip)(row, values, self.shape, self.law)
+        law = self.law
+        if isinstance(law, ByModulus):  # solids and their moduli may change between runs
+            solids = list(self.hub.solids.values())
+            moduli = np.array([_shear_modulus(solid) for solid in solids])
+            law = law._replace(moduli=moduli, firsts=np.array([s.first_id for s in solids]))
+        return press_kind(self.kind_of_press, self.grip)(row, values, self.shape, law)
 
     def seconds(self) -> float:
         return super().seconds() + OF_SHAPE * len(self.group)

@@ -2,7 +2,7 @@
 
 from typing import Annotated
 
-from karamelo_py.kernels.tools import Wedge
+from karamelo_py.kernels.tools import ByModulus, Wedge
 from karamelo_py.language.signature import NonNegative
 from karamelo_py.scene.group import ParticleGroup
 from karamelo_py.scene.hub import Hub
@@ -53,7 +53,7 @@ class CuttingTool(ShapedTool):
         if hub.domain.dimension != 2:
             raise ScriptError("this tool is for 2D", expected="a domain in 2D")
         tip = self.of_time("", (x_tip, y_tip, z_tip))
-        self.push(self.by_modulus(), K, *tip, xA, yA, xB, yB)
+        self.push(ByModulus(by_side=False), K, *tip, xA, yA, xB, yB)
         ends = self.now(*tip, xA, yA, xB, yB).reshape(3, 2)
         (ax, ay), (bx, by) = ends[1:] - ends[0]
         if not hub.rehearsing and not abs(ax * by - ay * bx) > 0:

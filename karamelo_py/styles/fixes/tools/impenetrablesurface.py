@@ -2,6 +2,7 @@
 
 from typing import Annotated
 
+from karamelo_py.kernels.tools import ByModulus
 from karamelo_py.language.signature import NonNegative
 from karamelo_py.scene.group import ParticleGroup
 from karamelo_py.scene.hub import Hub
@@ -44,4 +45,4 @@ class ImpenetrableSurface(PlaneTool):
         nx: Expression, ny: Expression, nz: Expression,
     ):  # fmt: skip
         super().__init__(hub, group)
-        self.push(self.by_modulus(by_side=True), K, *self.lay((xs, ys, zs), (nx, ny, nz)))
+        self.push(ByModulus(by_side=True), K, *self.lay((xs, ys, zs), (nx, ny, nz)))

@@ -5,6 +5,7 @@ from typing import Annotated, Literal, Self
 import numpy as np
 
 from karamelo_py.kernels.tools import BySquare, PressSquare
+from karamelo_py.language.arguments import NUMBER
 from karamelo_py.language.signature import Argument, NonNegative
 from karamelo_py.language.unknown import words_of
 from karamelo_py.scene.group import ParticleGroup
@@ -26,7 +27,8 @@ class Radius(Expression):
             ID, style, group, kind, K, *centre, R = words_of(argument.statement)
             line = ", ".join([ID, style, group, kind, K, R, *centre])
             message = f"the radius is {radius.constant:g}"
-            hint = f"with the radius in front of the centre: fix({line})"
+            zero = NUMBER.fullmatch(R) and not float(R) > 0
+            hint = None if zero else f"with the radius in front of the centre: fix({line})"
             raise ScriptError(message, mark=argument.mark, expected="a number above 0", hint=hint)
         return radius
 

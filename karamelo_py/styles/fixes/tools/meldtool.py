@@ -2,7 +2,7 @@
 
 from typing import Annotated, Literal
 
-from karamelo_py.kernels.tools import CHANNELS
+from karamelo_py.kernels.tools import CHANNELS, ByModulus
 from karamelo_py.language.signature import NonNegative
 from karamelo_py.scene.group import ParticleGroup
 from karamelo_py.scene.hub import Hub
@@ -60,4 +60,4 @@ class MeldTool(ShapedTool):
         if hub.domain.dimension != 3:
             raise ScriptError("this tool is for 3D", expected="a domain in 3D")
         self.shape = CHANNELS[axis]()
-        self.push(self.by_modulus(), K, half_width, c1, c2, theta, lo, hi, Rmax)
+        self.push(ByModulus(by_side=False), K, half_width, c1, c2, theta, lo, hi, Rmax)
