@@ -132,8 +132,8 @@ def auto(
 
     The script is read up to its first run; materials, bodies, speeds, contact and duration select a
     row of the table in docs/choose.md. The banner and ``check`` show the chosen lines, such as
-    ``method(...)``. Commands ``scheme``, ``anti_volumetric_locking`` and ``dt_factor`` in the
-    script take precedence.
+    ``method(...)``. Commands ``scheme``, ``anti_volumetric_locking``, ``dt_factor`` and ``set_dt``
+    in the script take precedence.
 
     Parameters
     ----------

@@ -37,9 +37,9 @@ class PolyPIC(NamedTuple):
     """PolyPIC: a point stores the multilinear velocity of its cell (4 modes in 2D, 8 in 3D).
 
     Use PolyPIC in the total frame with a linear basis. No mode is damped, so a step that follows
-    the strain in each vibration would add energy: the default step becomes shorter, but longer only
-    if 1.9 times the step is stable. A disk that vibrates for 20 periods loses 4
-    % of its energy with 4 cells in the radius and less than 0.1 % with 8 (APIC: 20 and 13 %).
+    the strain in each vibration would add energy. The step is therefore held: it increases only
+    once 1.9 times the step is stable. A disk that vibrates for 20 periods loses 4 % of its energy
+    with 4 cells in the radius and less than 0.1 % with 8 (APIC: 20 and 13 %).
 
     Example
     -------
