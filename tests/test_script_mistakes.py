@@ -324,6 +324,8 @@ def test_words_in_each_others_places(run_interpreted, line, told):
         ("group(g)\nfix(v, g, body_force, 0)", "expected: fix(v, body_force, g, ...)"),
         ("group(g, particles, region, box)", "hint: group(g, particles, region, box, all)"),
         ("group(g, nodes, solid, body)", "hint: group(g, nodes, region, box, solid, body)"),
+        ("group(g, solid, body)", "hint: group(g, particles, region, box, solid, body)"),
+        ("method(auto, 0.01)", "hint: accuracy=0.01"),
         (
             "fix(v, velocity_particles, body, 1)",
             "(body, particles, region, box, solid, body) makes",

@@ -451,14 +451,17 @@ class _Call:
                 hint=f"-var {word} mechanical removes it" if word else None,
             )
         for family in FAMILIES:
+            owners = []
             for name in registry.names(family):
                 with suppress(ScriptError):  # broken plug-ins are reported elsewhere
                     if word in variants_of(registry.find(family, name)):
-                        return ScriptError(
-                            f"{word} goes with {name}, not with {self.names[family]}",
-                            mark=argument.mark,
-                            expected=f"karamelo-py help {family} {name} explains it",
-                        )
+                        owners.append(name)
+            if owners:
+                return ScriptError(
+                    f"{word} goes with {' or '.join(owners)}, not with {self.names[family]}",
+                    mark=argument.mark,
+                    hint=f"karamelo-py help {family} {owners[0]} explains it",
+                )
         options = self._words("method", "transfer", "basis")
         return ScriptError(
             f"'{argument.text}' is not an option of method({', '.join(self.names.values())})",

@@ -12,7 +12,7 @@ from karamelo_py.script.errors import ScriptError
 
 LEAST, MOST = 0.01, 0.9
 HEAVIEST = 3.2  # density of grains / density of water; in soils it is 2.6 to 2.8
-SOFTEST = 1e-4  # bulk modulus of the water / oedometric modulus of the soil
+SOFTEST = 1e-3  # bulk modulus of the water / oedometric modulus of the soil
 SLOWEST, FASTEST = 1e-13, 10.0  # conductivities in m/s
 
 

@@ -55,6 +55,10 @@ def wrong_count(
 def _of_surplus(text: str, expected: Sequence[Parameter], name: str) -> str | None:
     if text.startswith("(") and (first := next((p.name for p in expected if p.keyword), None)):
         return f"{first}={text}"
+    named = [p for p in expected if p.keyword]
+    named = [p for p in named if not p.optional] or named
+    if number_of(text) is not None and len(named) == 1 and not named[0].kind.words:
+        return f"{named[0].name}={text}"
     words = {word: f"{p.name}={word}" for p in expected if p.keyword for word in p.kind.words}
     word = text if text in words else nearest(text, words)
     return words.get(word or "") or table()["surplus"].get(name)
@@ -86,8 +90,10 @@ def _completed(
     if misfit is not None:
         solid = misfit._interpreter.hub.solids.get(words[-1])
         region = solid.region.id if solid is not None and solid.region else "regionID"
+        given = next((word for word in slots[1].kind.words if word in words), None)
         form = table()["reordered"].get(f"{name} {misfit.text}")
-        return form and form.format(*words, region=region)
+        one, kind = solid.id if solid is not None else "solidID", given or slots[1].kind.words[0]
+        return form and form.format(*words, region=region, solid=one, kind=kind)
     if not all(slot.kind.words for slot in rest):
         return None
     return f"{name}({', '.join([*words, *(slot.kind.words[0] for slot in rest)])})"

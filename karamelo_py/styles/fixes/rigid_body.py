@@ -289,11 +289,15 @@ class RigidBody(Fix):
     def refresh(self) -> None:
         failed = int(self.state[0].failed)
         if failed > self.reported:
-            self.reported = 2 * failed
+            bodies = [fix for fix in self.hub.fixes.values() if isinstance(fix, RigidBody)]
+            alike = [fix for fix in bodies if fix.state[0].failed == failed]  # solved for together
+            for fix in alike:
+                fix.reported = 2 * failed
+            names = ", ".join(f"'{fix.body.id}'" for fix in alike)
             self.hub.warn(
-                f"impulses on '{self.body.id}' did not converge in {failed} steps",
+                f"impulses on {names} did not converge in {failed} steps",
                 mark=self.mark,
-                hint="smaller steps (dt_factor), less friction, or a heavier body",
+                hint="smaller steps (dt_factor, set_dt), less friction, or a heavier body",
             )
 
     def slots(self) -> np.ndarray:
