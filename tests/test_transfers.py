@@ -197,6 +197,9 @@ run(6000)
     assert dt[0] == pytest.approx(0.9 / 16 / (1 + 0.1), rel=0.01)  # h/(c + v)
     assert np.ptp(dt[-300:]) == 0
     assert max(E[-300:]) < 1.05 * max(E[:60])
+    longer = text.replace("run(6000)", "dt_factor(0.6)\nrun(100)\ndt_factor(0.9)\nrun(9)")
+    dt = run_script(longer).log.dt
+    assert dt[-1] / dt[-2] == pytest.approx(1.5, rel=0.1)
     assert "warning" not in found.out + found.err
 
 

@@ -280,7 +280,7 @@ STEP = np.dtype([
     ("contact_kick", np.float64),  # kick for steps of this length
     ("last_contact_dt", np.float64),
     ("release", np.float64),  # dt is held until it could be this many times as large; 0: never
-    ("held_dt", np.float64),
+    ("held", np.float64),  # held dt / dt_factor, as scripts and halvings change the factor
     ("spacing", np.float64),  # smallest cell size
     ("courant", np.float64),  # stable step * rate / cell size
     ("courant_moving", np.float64),  # `courant` once points have moved

@@ -70,9 +70,11 @@ def choose_dt(control: Control) -> None:
     dt = step.fixed_dt if step.fixed_dt > 0 else dt
     anew = step.last_dt == 0
     if step.release > 0 and not anew:
-        if 0 < step.held_dt < dt <= step.release * step.held_dt:
-            dt = step.held_dt
-        step.held_dt = dt
+        held = step.held * step.dt_factor
+        if 0 < held < dt <= step.release * held:
+            dt = held
+        else:
+            step.held = dt / step.dt_factor
     whole = dt
     limit = min(limit, heat.heat_limit)
     step.limit = limit

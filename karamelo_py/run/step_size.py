@@ -71,9 +71,9 @@ Carried = tuple[float, float, float, float, float]
 
 
 def carried_on(control: Control) -> Carried:
-    """Return last dt, contact dt, held dt, path and loss of deleted points for a new lowering."""
+    """Return last dt, contact dt, held limit, path and loss of deleted points for new arrays."""
     step, path, lost = control.step[0], control.motion[0].path, control.energy[0].lost_with_deleted
-    times = float(step.last_dt), float(step.last_contact_dt), float(step.held_dt)
+    times = float(step.last_dt), float(step.last_contact_dt), float(step.held)
     return *times, float(path), float(lost)
 
 
@@ -81,7 +81,7 @@ def set_up(control: Control, hub: Hub, transfer: Tag, last: Carried | None) -> N
     """Set the clock of new arrays, continuing after the `last` steps."""
     step, heat = control.step[0], control.heat[0]
     if last is not None:
-        step.last_dt, step.last_contact_dt, step.held_dt, control.motion[0].path, lost = last
+        step.last_dt, step.last_contact_dt, step.held, control.motion[0].path, lost = last
         control.energy[0].lost_with_deleted = lost
     step.spacing = min(lattice.h for lattice in hub.lattices)
     heat.heat_limit = heat.heat_reference = stable_conduction(hub)
