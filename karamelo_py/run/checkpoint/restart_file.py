@@ -33,7 +33,7 @@ from karamelo_py.script.errors import Mark, ScriptError
 if TYPE_CHECKING:
     import h5py
 
-FORMAT, VERSION = "karamelo-py restart", 11
+FORMAT, VERSION = "karamelo-py restart", 12
 OURS = "a file that restart or write_restart of karamelo-py has written"
 CONTENT = (
     "within", "statements", "values of statements", "presets", "variables", "runs", "chosen",
