@@ -308,6 +308,19 @@ def test_what_tools_refuse(run_interpreted, line, says):
     assert says in run_interpreted(block(2, line), status=1).err
 
 
+@pytest.mark.parametrize(
+    ("tool", "says"),
+    [
+        ("impenetrablesurface, all, 1, 0.2, 0, 0, LATER, 0, 0", "the normal has no direction"),
+        ("cuttingtool, all, 1, 0, 0, 0, 0, 0, 0, 0, 0.1, LATER, 0.1", "tip, A and B lie in one"),
+    ],
+)
+def test_a_shape_that_becomes_undefined_stops_the_run(run_script, tool, says):
+    fix = f"fix(F, {tool})".replace("LATER", "if(time < 0.005, 0.1, 0)")
+    err = run_script(block(2, fix, f"set_dt({DT})", "run(10)"), status=1).err
+    assert f"fix F: {says}" in err
+
+
 def test_a_tool_needs_a_shear_modulus(run_interpreted):
     text = block(2, "fix(F, impenetrablesurface, all, 1, 0, 0, 0, 0, 1, 0)")
     fluid = "eos(e, fluid, 2, 100, 7)\nstrength(s, fluid, 0)\nmaterial(rubber, e, s)"

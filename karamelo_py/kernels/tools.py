@@ -79,7 +79,8 @@ def _way_out_ball(shape, kin, values, x):
 def _way_out_wedge(shape, kin, values, x):
     tip = x._make(values[:2])
     a, b = x._make(values[2:4]) - tip, x._make(values[4:6]) - tip
-    side = 1.0 if a[0] * b[1] - a[1] * b[0] > 0 else -1.0
+    turn = a[0] * b[1] - a[1] * b[0]
+    side = turn / abs(turn)  # NaN if the faces lie in one line
     first = side / sqrt(a.squared()) * x._make((a[1], -a[0]))
     second = side / sqrt(b.squared()) * x._make((-b[1], b[0]))
     of_first, of_second = dot(tip - x, first), dot(tip - x, second)
@@ -247,7 +248,7 @@ def _results_of_press(tag, members, one):
     values = one.values
     point, _ = _pushed_point(tag, members, one)
     out = way_out(tag.shape, members.kin, values[1:], point.x)
-    if not out[0] > 0:
+    if out[0] <= 0:  # not NaN, for a shape without a direction
         return point.x - point.x
     point = point._replace(modulus=modulus_of(tag.law, members, one))
     return push(tag.law, members.kin, values, point, out)

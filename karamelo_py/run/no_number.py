@@ -59,6 +59,10 @@ def _places(
 def no_number(simulation: SceneState, message: str, hint: str) -> Trouble:
     hub = simulation.hub
     candidates = [one for one in simulation.points.seen(_first_bad) if one is not None]
+    for fix in hub.fixes.values() if not candidates else ():
+        if wrong := fix.undefined():
+            message = f"{message}: fix {fix.id}: {wrong[0]}"
+            return Trouble(message, f"{wrong[1]} at all times", "not-a-number", mark=fix.mark)
     if not candidates:
         return Trouble(message, hint, "not-a-number")
     (which, k, _), value, x = min(candidates, key=lambda one: one[0])

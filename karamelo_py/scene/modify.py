@@ -151,6 +151,10 @@ class Fix(Publisher):
     def all_formulas(self) -> list[Expression]:
         return list(_formulas_in(tuple(vars(self).values())))
 
+    def undefined(self) -> tuple[str, str] | None:
+        """Return what makes a shape undefined at present, and what is expected; or None."""
+        return None
+
     def is_endless(self, axis: int) -> bool:
         """True if a tool is the same at all positions along an axis."""
         return False

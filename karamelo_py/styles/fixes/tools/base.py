@@ -113,6 +113,11 @@ class ShapedTool(ToolFix):
             law = law._replace(moduli=moduli, firsts=np.array([s.first_id for s in solids]))
         return press_kind(self.kind_of_press, self.grip)(row, values, self.shape, law)
 
+    def refuse_undefined(self) -> None:
+        # in a rehearsal, some values are unknown
+        if not self.hub.rehearsing and (wrong := self.undefined()):
+            raise ScriptError(wrong[0], expected=wrong[1])
+
     def seconds(self) -> float:
         return super().seconds() + OF_SHAPE * len(self.group)
 
@@ -125,6 +130,7 @@ class ShapedTool(ToolFix):
 
     def forces(self, points: PointsView) -> np.ndarray:
         """Return the forces (n, d) in load steps."""
+        self.refuse_undefined()
         x, force = points.position.astype(float), np.empty(points.position.shape)
         modulus = self.stiffness(points) if isinstance(self.law, ByModulus) else np.zeros(len(x))
         seen = PushedPoint(x, points.mass.astype(float), self.side(points), modulus)
@@ -142,11 +148,13 @@ class PlaneTool(ShapedTool):
         """Return the formulas of the shape."""
         origin = self.of_time("", origin)
         self.towards = self.of_time("n", normal)
-        size = np.linalg.norm(self.now(*self.towards))
-        # in a rehearsal, some values are unknown
-        if not self.hub.rehearsing and not (np.isfinite(size) and size > 0):
-            raise ScriptError("the normal has no direction", expected="a vector that is not 0")
+        self.refuse_undefined()
         return *origin, *self.towards
+
+    def undefined(self) -> tuple[str, str] | None:
+        size = np.linalg.norm(self.now(*self.towards))
+        defined = np.isfinite(size) and size > 0
+        return None if defined else ("the normal has no direction", "a vector that is not 0")
 
     def is_endless(self, axis: int) -> bool:
         normal = self.towards[axis]

@@ -54,7 +54,10 @@ class CuttingTool(ShapedTool):
             raise ScriptError("this tool is for 2D", expected="a domain in 2D")
         tip = self.of_time("", (x_tip, y_tip, z_tip))
         self.push(ByModulus(by_side=False), K, *tip, xA, yA, xB, yB)
-        ends = self.now(*tip, xA, yA, xB, yB).reshape(3, 2)
-        (ax, ay), (bx, by) = ends[1:] - ends[0]
-        if not hub.rehearsing and not abs(ax * by - ay * bx) > 0:
-            raise ScriptError("tip, A and B lie in one line", expected="two faces with an angle")
+        self.refuse_undefined()
+
+    def undefined(self) -> tuple[str, str] | None:
+        tip, *ends = self.now(*self.values_of_time[1:]).reshape(3, 2)
+        (ax, ay), (bx, by) = ends - tip
+        defined = abs(ax * by - ay * bx) > 0
+        return None if defined else ("tip, A and B lie in one line", "two faces with an angle")
