@@ -160,10 +160,11 @@ def test_a_ball_is_pressed_in(run_script, scheme):
     """Newton's method squares errors with a force that turns as points move, too."""
     ball = "fix(pull, indent, all, sphere, 1e5, 0.4, 1.3 - 0.02*time, 0.5, 0)"
     lines = "fix(hold, velocity_nodes, left, 0, 0)\n    " + ball + "\n    set_dt(1)"
-    log_of = run_script(patch(lines, ", hold_x").replace("quasi-static", scheme)).log
+    log_of = run_script(patch(lines, ", hold_x, pull_s").replace("quasi-static", scheme)).log
     assert log_of["pull_x"][-1] < -0.1 and max(log_of["iterations"]) <= 6
     if scheme == "quasi-static":
         assert np.allclose(log_of["hold_x"], -log_of["pull_x"], rtol=1e-8)
+        assert [*log_of["pull_s"]] == [0, 16, 18, 24, 28]  # points in the ball after each step
 
 
 @pytest.mark.full

@@ -235,9 +235,14 @@ def grip_of(tag, members):
     return None
 
 
-def _pushed_point(tag, members, one):
+def _position(members, one):
     kin = members.kin
-    x = zero_vector(kin, 0.0)._make([float(a) for a in load_vector(kin, members.x, one.p)])
+    return zero_vector(kin, 0.0)._make([float(a) for a in load_vector(kin, members.x, one.p)])
+
+
+def _pushed_point(members, one, x):
+    """Return a point at `x`, without its modulus, and its volume."""
+    kin = members.kin
     volume = float(volume_of(kin, members.points, one.law, one.state, one.p))
     mass = float(members.points.mass[one.p])
     return PushedPoint(x, mass, 2 * radius(kin, volume, x), 0.0), volume
@@ -245,11 +250,11 @@ def _pushed_point(tag, members, one):
 
 @hooks.results.on(Press)
 def _results_of_press(tag, members, one):
-    values = one.values
-    point, _ = _pushed_point(tag, members, one)
-    out = way_out(tag.shape, members.kin, values[1:], point.x)
+    values, x = one.values, _position(members, one)
+    out = way_out(tag.shape, members.kin, values[1:], x)
     if out[0] <= 0:  # not NaN, for a shape without a direction
-        return point.x - point.x
+        return x - x
+    point, _ = _pushed_point(members, one, x)
     point = point._replace(modulus=modulus_of(tag.law, members, one))
     return push(tag.law, members.kin, values, point, out)
 
@@ -273,20 +278,21 @@ def _velocity_of_ball(shape, kin, values):
 
 @hooks.results.on(PressStiffly)
 def _results_of_press_stiffly(tag, members, one):
-    return _press_stiffly(tag, members, one, _pushed_point(tag, members, one)[0])
+    point, _ = _pushed_point(members, one, _position(members, one))
+    force, _ = _press_stiffly(tag, members, one, point)
+    return force
 
 
 @hooks.results.on(PressBall)
 def _results_of_press_ball(tag, members, one):
-    point, volume = _pushed_point(tag, members, one)
-    force = _press_stiffly(tag, members, one, point)
-    touches = way_out(tag.shape, members.kin, one.values, point.x)[0] + 0.5 * point.side > 0
-    area = face(members.kin, volume, point.x) if touches else 0.0
+    point, volume = _pushed_point(members, one, _position(members, one))
+    force, overlap = _press_stiffly(tag, members, one, point)
+    area = face(members.kin, volume, point.x) if overlap > 0 else 0.0
     return (*force, *(0.0,) * (3 - len(force)), area)
 
 
 def _press_stiffly(tag, members, one, point):
-    """Return the force that moves a free point out of the shape in a step, and its friction.
+    """Return the force that moves a free point out of the shape in a step, and the overlap.
 
     Friction, at most mu times this force (de Vaucorbeil & Nguyen 2021), stops and reverses the
     slip.
@@ -299,11 +305,11 @@ def _press_stiffly(tag, members, one, point):
     load, grip = stiffness * max(depth, 0.0), grip_of(tag, members)
     force = load * normal
     if grip is None:
-        return force
+        return force, depth
     if not depth > -CLOSE * 0.5 * point.side:
         if grip[d, one.p] != 0:
             store(grip, one.p, (0.0,) * (2 * d + 2))
-        return force
+        return force, depth
     velocity, way = velocity_of(tag.shape, kin, values), none
     now = none._make([float(v) for v in load_vector(kin, members.points.v, one.p)])
     slip = velocity - now
@@ -318,7 +324,7 @@ def _press_stiffly(tag, members, one, point):
     rubbed, after = rub(tag.law.mu, load, memory, along(contact_dt * stiffness * slip, normal))
     store(grip, one.p, (*after.hold, after.mean, after.unused, *point.x))
     increase(field(members.points.fields, ContactLoss), one.p, (kick * dot(rubbed, slip),))
-    return force + rubbed
+    return force + rubbed, depth
 
 
 def press_kind(base: type, grip: type | None) -> type[Press]:

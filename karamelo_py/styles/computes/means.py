@@ -336,20 +336,19 @@ class Probe(Mean):
         if self.point is None and not self.at:
             super().refresh()
             return
-        nearest = self._nearest()
+        nearest = self.nearest_of_all()
         self.publish_all(*(nearest[2:] if nearest else [self.empty] * len(self.columns)))
-        if far := self.far():
+        if far := self.far(nearest):
             self.hub.warn(
                 f"compute probe '{self.id}': " + FAR.format(**far), mark=self.mark, hint=INSIDE
             )
 
-    def _nearest(self) -> list[float] | None:
+    def nearest_of_all(self) -> list[float] | None:
         return min(self.hub.fields.each(self, "nearest"), default=None)
 
-    def far(self) -> dict[str, str]:
+    def far(self, nearest: list[float] | None) -> dict[str, str]:
         """Return, once, words about a position more than a cell away from all points."""
-        nearest = self._nearest() if self.at and not self._has_warned else None
-        if nearest is None or nearest[0] <= self.hub.domain.h**2:
+        if not self.at or self._has_warned or nearest is None or nearest[0] <= self.hub.domain.h**2:
             return {}
         self._has_warned = True
         place = ", ".join(f"{axis}={c:g}" for axis, c in self.at.items())
@@ -375,7 +374,7 @@ class Probe(Mean):
 known_failure(
     Probe,
     "compute probe '{part.id}'",
-    when=lambda probe, scene: probe.far(),
+    when=lambda probe, scene: probe.far(probe.nearest_of_all()) if probe.at else {},
     reason=FAR,
     cure=INSIDE,
 )

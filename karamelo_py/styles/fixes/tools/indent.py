@@ -10,6 +10,7 @@ from karamelo_py.language.signature import Argument, NonNegative
 from karamelo_py.language.unknown import words_of
 from karamelo_py.scene.group import ParticleGroup
 from karamelo_py.scene.hub import Hub
+from karamelo_py.scene.views import PointsView
 from karamelo_py.script.errors import ScriptError
 from karamelo_py.script.expressions import Expression
 from karamelo_py.styles.fixes.tools.base import BallTool
@@ -70,3 +71,7 @@ class Indent(BallTool):
         past = np.maximum(domain.lo[: len(c)] - c, c - domain.hi[: len(c)]).max()
         if all(f.is_constant for f in (R, *centre)) and past > R.constant:
             hub.warn("the ball is outside the domain", hint="K and R come before x, y, z")
+
+    def publish_load(self, points: PointsView, force: np.ndarray) -> None:
+        super().publish_load(points, force)
+        self.publish("s", points.total(force.any(axis=1)))
