@@ -122,7 +122,7 @@ def remember_stencils(product: ModuleType) -> tuple[Callable, Callable]:
             stencil = locate(basis, kin, grid, place)
             # With these two and the stencil alive, nothing else has their identities.
             found = stencils[key] = stencil, basis, kin
-            things[id(stencil)] = {}
+            things[id(stencil)] = {"alive": stencil}
         return found[0]
 
     def kept(stencil, key, make):
@@ -430,12 +430,13 @@ def visit_nodes_at_once(
 
         def _of_all(self, name):
             w, stencil = self.w, self.stencil
-            every = range(len(self.i))
-            return kept(
-                stencil,
-                name,
-                lambda: stacked([getattr(views.node_of(w, stencil, k), name) for k in every]),
-            )
+
+            def made():
+                every = [views.node_of(w, stencil, k) for k in range(len(self.i))]
+                return stacked([getattr(node, name) for node in every])
+
+            found = kept(stencil, name, made)
+            return made() if found is None else found  # cleared by another thread
 
         arm = property(lambda node: node._of_all("arm"))
         affine_N = property(lambda node: node._of_all("affine_N"))
