@@ -122,9 +122,13 @@ def pytest_collection(session: pytest.Session) -> None:
 
 
 def pytest_collection_finish() -> None:
-    """Modules and tests stay to the end: Python's collector need not go through them again."""
+    """Modules and tests stay to the end: Python's collector need not go through them again.
+
+    It runs seldom: scenes make many objects, few of them in cycles.
+    """
     gc.collect()
     gc.freeze()
+    gc.set_threshold(50_000, 20, 100)
 
 
 def _prepared(folder: Path, script: str | Path) -> Path:
