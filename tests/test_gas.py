@@ -1,8 +1,10 @@
 """Gases take as heat the kinetic energy that a transfer takes."""
 
+import re
+
 import numpy as np
 import pytest
-from conftest import INPUTS
+from conftest import INPUTS, ROOT
 from selection import parameters
 
 TUBE = """
@@ -190,3 +192,12 @@ def test_first_step_of_a_shock(run_interpreted):
     log = run_interpreted(WALL).log
     assert log.dt[0] == pytest.approx(0.9 * 0.1 / (2 * 6 + 1), rel=2e-3)
     assert log.Ek.max() <= log.Ek[0] * (1 + 1e-9)
+
+
+def test_auto_follows_a_gas_that_expands_into_empty_space(run_interpreted):
+    """Its points keep their neighbours, so it does not separate: Landau & Lifshitz 1987, 99."""
+    text = (ROOT / "docs" / "verdicts" / "in.expansion").read_text("utf-8")
+    text = re.sub(r"^method.*", "method(auto)", text, flags=re.M).replace("dt_factor(CFL)\n", "")
+    done = run_interpreted(text, "-var", "g", "1.2")
+    assert re.search("^  method +tlmpm APIC linear usl$", done.out, re.M)
+    assert done.log.err[-1] < 0.045  # 8.7 % and more in ulmpm

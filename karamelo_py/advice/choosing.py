@@ -27,6 +27,7 @@ from karamelo_py.advice.crossing import boxes_of, meetings
 from karamelo_py.advice.facts import SceneFacts
 from karamelo_py.points.laws import LawTraits, can, conductivity, law_kind, law_traits, parameter
 from karamelo_py.points.laws.eos import taken_heat
+from karamelo_py.points.laws.eos.fluid import STEP
 from karamelo_py.points.laws.strengths import shear_modulus
 from karamelo_py.points.laws.strengths.mu_i import MuI
 from karamelo_py.points.laws.viscosity import diffuses_energy
@@ -106,6 +107,18 @@ class Scouted(SceneFacts):
     wet = property(lambda s: any(solid.material.fluid for solid in s.soft))
     gas = property(lambda s: any(can(law, taken_heat) for law in s.laws))
     grains = property(lambda s: any(MuI in law_kind(law) for law in s.laws))
+
+    @property
+    def calm(self) -> bool:
+        """Return True if one body starts slowly and nothing loads it: no strong wave arises.
+
+        A body that drifts meets a wall, and only artificial viscosity damps the front that follows.
+        """
+        held = not (self.burns or self.weighed or self.pressed)
+        drifts = any(np.linalg.norm(m.velocity) > 0.1 * self.fastest for m in self.motions)
+        damped = all(parameter(law, "viscosity", None) for law in self.laws)
+        uniform = len(self.soft) == 1 and self.pressure_ratio < STEP
+        return self.alone and held and uniform and self.speed < 0.1 and (damped or not drifts)
 
     @property
     def liquid(self) -> bool:
