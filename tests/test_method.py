@@ -203,6 +203,9 @@ def fluid(eos, strength="fluid, 0"):
          "method(ulmpm, APIC, cubic-spline, mass=corrected)"),
         (fluid("ideal-gas, 1, 1.4, p=1e5"), "fix(v, initial_velocity_particles, all, 9, 0)",
          "method(ulmpm, APIC, cubic-spline, mass=corrected)"),
+        (fluid("ideal-gas, 1, 1.4, p=1e5"),  # vortices
+         "fix(v, initial_velocity_particles, all, sin(30*y0), 0)\nrun_time(1)",
+         "method(ulmpm, APIC, cubic-spline, mass=corrected)"),
         (fluid("ideal-gas, 1, 1.4, p=1e5, Q1=2"), "fix(v, initial_velocity_particles, all, 9, 0)",
          "method(tlmpm, APIC, linear); scheme(usl)"),
         (fluid("ideal-gas, 1, 1.4, p=1e5"), f"eos(f, ideal-gas, 1, 1.4, p=1e6)\nmaterial(n, "

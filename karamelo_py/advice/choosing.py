@@ -110,15 +110,19 @@ class Scouted(SceneFacts):
 
     @property
     def calm(self) -> bool:
-        """Return True if one body starts slowly and nothing loads it: no strong wave arises.
+        """Return True if one body starts slowly, nothing loads it, and points keep neighbours.
 
         A body that drifts meets a wall, and only artificial viscosity damps the front that follows.
+        In 2D and 3D, long paths may be those of vortices.
         """
         held = not (self.burns or self.weighed or self.pressed)
         drifts = any(np.linalg.norm(m.velocity) > 0.1 * self.fastest for m in self.motions)
         damped = all(parameter(law, "viscosity", None) for law in self.laws)
+        slow = self.speed < (0.7 if damped else 0.1) and (damped or not drifts)
+        path = self.fastest * self.duration
+        near = self.d == 1 or all(path < 0.2 * motion.size for motion in self.motions)
         uniform = len(self.soft) == 1 and self.pressure_ratio < STEP
-        return self.alone and held and uniform and self.speed < 0.1 and (damped or not drifts)
+        return self.alone and held and uniform and slow and near
 
     @property
     def liquid(self) -> bool:
