@@ -14,6 +14,8 @@ from math import atan, cos, exp, log, pi, sin, sqrt, tan
 from pathlib import Path
 
 import numpy as np
+from scipy.integrate import cumulative_trapezoid
+from scipy.optimize import brentq
 
 DATA = Path(__file__).parent / "data"
 
@@ -328,6 +330,58 @@ def spiral_slip(beta: float, phi: float) -> tuple[float, np.ndarray]:
     r = np.exp((angle - angle[0]) * t) / H[k]
     line = np.stack([-r * np.cos(angle), -r * np.sin(angle)], 1)
     return float(N[k]), line - line[-1]
+
+
+def riemann(left, right, gamma: float):
+    """Density, velocity and pressure over x/t after a wall between two gases at rest is removed.
+
+    `left` has the larger pressure: a fan runs to the left, a shock to the right. `left` and `right`
+    are density and pressure. Source: Toro 2009, chapter 4.
+    """
+    (dense, high), (thin, low) = left, right
+    c, ahead = sqrt(gamma * high / dense), sqrt(gamma * low / thin)
+    up, down, power = gamma + 1, gamma - 1, (gamma - 1) / (2 * gamma)
+
+    def shock(p):  # velocity behind it
+        return (p - low) * sqrt(2 / (up * thin) / (p + down / up * low))
+
+    def fan(p):
+        return 2 * c / down * (1 - (p / high) ** power)
+
+    p = brentq(lambda p: shock(p) - fan(p), low, high, rtol=1e-14)
+    u, inner = shock(p), c * (p / high) ** power
+    front = ahead * sqrt(up / (2 * gamma) * p / low + power)
+    behind = thin * (p / low + down / up) / (down / up * p / low + 1)
+
+    def profiles(s: np.ndarray) -> tuple[np.ndarray, ...]:
+        sound = np.maximum(2 / up * c - down / up * s, 0) / c
+        parts = [s < -c, s < u - inner, s < u, s < front]
+        density = dense * sound ** (2 / down), dense * (p / high) ** (1 / gamma), behind
+        return (
+            np.select(parts, [dense, *density], thin),
+            np.select(parts, [0.0, 2 / up * (c + s), u, u], 0.0),
+            np.select(parts, [high, high * sound ** (1 / power), p, p], low),
+        )
+
+    return profiles
+
+
+TNT = 1630, 371.2e9, 3.231e9, 4.15, 0.95, 0.30, 7e9, 6930  # rho, A, B, R1, R2, omega, E0, D
+
+
+def release_of_tnt() -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """x/t, pressure and velocity in the wave after a plane detonation (Taylor 1950)."""
+    rho, A, B, R1, R2, W, E0, _ = TNT
+    V = np.linspace(0.7, 0.8, 10001)
+    cold = sum(a * (1 - W / (r * V)) * np.exp(-r * V) for a, r in ((A, R1), (B, R2)))
+    p = (cold + W * E0 / V) / (1 - W * (1 - V) / (2 * V))
+    k = (p / (1 - V)).argmin()  # where the Rayleigh line is tangent
+    start, v = V[k], np.linspace(V[k], 1.2, 2001)
+    left = p[k] - A * exp(-R1 * start) - B * exp(-R2 * start)
+    terms = A * np.exp(-R1 * v), B * np.exp(-R2 * v), left * (v / start) ** -(1 + W)
+    c = np.sqrt((R1 * terms[0] + R2 * terms[1] + (1 + W) * terms[2] / v) / rho)
+    u = np.sqrt(p[k] * (1 - start) / rho) - cumulative_trapezoid(c, v, initial=0)
+    return u + v * c, sum(terms), u
 
 
 def granular_runout(aspect: float) -> float:

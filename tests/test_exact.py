@@ -184,6 +184,24 @@ def printed(run_script, scene, kind, place, time, *formulas):
     ]
 
 
+@pytest.mark.parametrize(
+    ("left", "right", "pressure", "speed", "densities"),
+    [
+        ((1.0, 1.0), (0.125, 0.1), 0.30313, 0.92745, (0.42632, 0.26557)),
+        ((1.0, 1000.0), (1.0, 0.01), 460.894, 19.5975, (0.57506, 5.99924)),
+    ],
+)
+def test_shock_tubes(left, right, pressure, speed, densities):
+    """Toro 2009, table 4.3; density at the ends of the fan is continuous."""
+    profiles = exact.riemann(left, right, 1.4)
+    for side, density in zip((-1e-4, 1e-4), densities, strict=True):
+        found = profiles(np.array([speed * (1 + side)]))
+        assert np.ravel(found) == pytest.approx([density, speed, pressure], rel=1e-4)
+    s = np.linspace(-1.01 * np.sqrt(1.4 * left[1]), 0.9 * speed, 4001)
+    assert abs(np.diff(profiles(s)[0])).max() < 1e-3
+    assert profiles(np.array([-1e3, 1e3]))[2].tolist() == [left[1], right[1]]
+
+
 # At nodes that stay, two Newton steps from a start within (pi G)^2 of X leave about 1e-6.
 AT_NODES = {"ulmpm": 1e-5, "tlmpm": 1e-12}
 

@@ -253,6 +253,37 @@ def test_auto_by_the_scene(run_interpreted, material, more, lines):
         assert re.search("^method .* usavg( |$)", said, re.M)
 
 
+WALLS = "region(in, block, 0.05, 0.95, exterior)\ngroup(w, nodes, region, in, all)\n"
+CORE = """eos(h, ideal-gas, 1, 1.4, p=2e7)
+material(hot, eos-strength, h, s)
+region(core, block, 0, 0.1)
+delete_particles(body, region, core)
+solid(core, region, core, 2, hot, 0.1)
+"""
+
+
+@pytest.mark.parametrize(
+    ("eos", "more", "lines"),
+    [
+        ("ideal-gas, 1, 1.4, p=1e5", f"{WALLS}fix(w, velocity_nodes, w, 0)",
+         "method(tlmpm, APIC, linear); scheme(usl)"),
+        ("ideal-gas, 1, 1.4, p=1e5", f"{WALLS}fix(w, velocity_nodes, w, 1)",
+         "method(tlmpm, TPIC, quadratic-spline)"),
+        ("ideal-gas, 1, 1.4, p=1e5", CORE.replace("2e7", "4e5"),
+         "method(ulmpm, APIC, cubic-spline); scheme(usl)"),
+        ("ideal-gas, 1, 1.4, p=1e5", CORE,
+         "method(ulmpm, FLIP, quadratic-spline, 1); scheme(usavg)"),
+        ("jwl, 1630, 3.712e11, 3.23e9, 4.15, 0.95, 0.3, 7e9, 6930", "",
+         "method(tlmpm, TPIC, quadratic-spline)"),
+    ],
+)  # fmt: skip
+def test_auto_for_gas_in_one_dimension(run_interpreted, eos, more, lines):
+    """Sound in a tube, a piston, a shock, a blast from one cell, and a detonation."""
+    text = AUTO.format(d=1, domain="0, 1", box="0, 1", material=fluid(eos), more=more)
+    said = run_interpreted(text, command="check").out
+    assert lines in re.search("which writes +(.*)", said)[1]
+
+
 def test_a_step_set_in_a_resumed_run_replaces_the_factor_of_auto(run_interpreted):
     """The script names one of both, so nothing is to leave out."""
     gas = fluid("ideal-gas, 1, 1.4, p=1, Q1=0.1, Qh=3")

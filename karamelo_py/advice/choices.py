@@ -90,6 +90,13 @@ CHOICES = (
         ("in.wet_column",),
     ),
     Choice(
+        lambda s: s.gas and s.thins,
+        ("method({grid}, FLIP, quadratic-spline, 1)", "scheme(usavg)"),
+        "a gas under high pressure in a small part of the space",
+        "where points become more than a cell apart, FLIP keeps their volumes right",
+        ("in.blast",),
+    ),
+    Choice(
         lambda s: s.gas and s.speed > 1 and s.d > 1 and s.diffuses,
         ("method(ulmpm, TPIC, cubic-spline)", "scheme(usavg)", "dt_factor(0.6)"),
         "a gas that moves faster than its waves, with an artificial heat flux",
@@ -114,6 +121,13 @@ CHOICES = (
         ("in.organ", "in.expansion"),
     ),
     Choice(
+        lambda s: s.gas and s.alone and s.d == 1 and (s.burns or s.pressed or s.speed > 0.1),
+        ("method(tlmpm, TPIC, quadratic-spline)",),
+        "shocks or a detonation in one gas in one dimension",
+        "points stay in their cells, and TPIC does not oscillate after a shock",
+        ("in.tnt_slab", "in.noh_plane"),
+    ),
+    Choice(
         lambda s: s.gas and len(s.soft) == 1 and s.speed < 0.1 and not s.burns,
         ("method(ulmpm, APIC, cubic-spline, mass=corrected)",),
         "slow flow of a gas",
@@ -121,18 +135,11 @@ CHOICES = (
         ("in.piston",),
     ),
     Choice(
-        lambda s: s.burns and s.alone and s.d == 1,
-        ("method(tlmpm, TPIC, quadratic-spline)",),
-        "a detonation in one dimension",
-        "points stay in their cells, so the peak is damped least",
-        ("in.tnt_slab",),
-    ),
-    Choice(
         lambda s: s.gas and s.pressure_ratio < STRONG and s.grid == "ulmpm" and not s.burns,
         ("method(ulmpm, APIC, cubic-spline)", "scheme(usl)"),
         "shocks in a gas, with pressures at the start in a ratio below 20",
         "APIC oscillates least after a shock",
-        ("in.sod", "in.noh_plane"),
+        ("in.sod",),
         "usl needs half as many passes over the points as musl",
     ),
     Choice(
@@ -140,7 +147,7 @@ CHOICES = (
         ("method({grid}, APIC, cubic-spline)",),
         "strong shocks in a gas",
         "APIC oscillates least after a shock, and with usl more energy would be lost",
-        ("in.strong_shock", "in.blast"),
+        ("in.strong_shock",),
     ),
     Choice(
         lambda s: s.grains,

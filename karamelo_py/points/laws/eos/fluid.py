@@ -220,9 +220,13 @@ def _shocks(eos, scene):
     ratio = scene.pressure_ratio
     if not scene.moves or ratio < STEP:
         return None
+    cubic = scene.moments and scene.basis.traits.allows_drift
+    smooth = cubic or scene.scheme.traits.allows_drift
     if scene.linear:
         loss = f"{scene.transfer_name} with a linear basis loses 33 % of the pressure or more"
-    elif ratio < STRONG or scene.scheme.traits.allows_drift:
+    elif scene.moments and scene.thins:
+        loss = "points that are more than a cell apart lose up to half of the energy"
+    elif ratio < STRONG or smooth:
         return None
     else:
         loss = "this scheme loses 3 to 15 % of the energy at the front"
