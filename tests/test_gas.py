@@ -7,6 +7,8 @@ import pytest
 from conftest import INPUTS, ROOT
 from selection import parameters
 
+from comparisons.lesser import radius_of_shock
+
 TUBE = """
     method(ulmpm, {transfer}, quadratic-spline, {alpha})
     dimension(1, 0, 1, 0.1)
@@ -201,3 +203,21 @@ def test_auto_follows_a_gas_that_expands_into_empty_space(run_interpreted):
     done = run_interpreted(text, "-var", "g", "1.2")
     assert re.search("^  method +tlmpm APIC linear usl$", done.out, re.M)
     assert done.log.err[-1] < 0.045  # 8.7 % and more in ulmpm
+
+
+def test_auto_follows_a_blast(run_script, run_interpreted):
+    """Radius of a blast from three cells: Sedov 1959 (Kamm & Timmes 2007, LA-UR-07-2849)."""
+    script, spherical, gas = (
+        (INPUTS / "models" / name).read_text("utf-8")
+        for name in ("in.blast", "blast.spherical", "blast.gas")
+    )
+    text = script.replace('include("blast." + model)', spherical).replace("dt_factor(0.3)\n", "")
+    text = text.replace('include("blast.gas")', gas)
+    apart = "points that are more than a cell apart lose up to half of the energy"
+    assert apart in run_interpreted(text, command="check").err
+    text = text.replace("method(ulmpm, APIC, quadratic-spline)", "method(auto)")
+    done = run_script(text)
+    assert apart not in done.err
+    assert re.search(r"^  method +ulmpm FLIP \(alpha 1\) quadratic-spline usavg$", done.out, re.M)
+    # 1.2, 0.2 and 0.3 % with 20, 40 and 80 cells; APIC is right near 40, 4 % off with 160.
+    assert radius_of_shock(done) == pytest.approx(0.7579, rel=0.005)
