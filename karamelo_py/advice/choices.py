@@ -93,7 +93,7 @@ CHOICES = (
         lambda s: s.gas and s.thins,
         ("method({grid}, FLIP, quadratic-spline, 1)", "scheme(usavg)"),
         "a gas under high pressure in a small part of the space",
-        "where points become more than a cell apart, FLIP keeps their volumes right",
+        "volumes of points more than a cell apart remain right with FLIP",
         ("in.blast",),
     ),
     Choice(
@@ -116,7 +116,7 @@ CHOICES = (
         lambda s: s.gas and s.calm,
         ("method(tlmpm, APIC, linear)", "scheme(usl)"),
         "slow waves in a gas, or a gas that expands from rest",
-        "points keep their neighbours, so a linear basis is second order, and gas that expands "
+        "points have the same neighbours, so a linear basis is second order, and gas that expands "
         "does not separate",
         ("in.organ", "in.expansion"),
     ),
@@ -131,7 +131,7 @@ CHOICES = (
         lambda s: s.gas and len(s.soft) == 1 and s.speed < 0.1 and not s.burns,
         ("method(ulmpm, APIC, cubic-spline, mass=corrected)",),
         "slow flow of a gas",
-        "corrected accelerations keep steep waves without artificial viscosity",
+        "corrected accelerations retain steep waves without artificial viscosity",
         ("in.piston",),
     ),
     Choice(

@@ -110,10 +110,10 @@ class Scouted(SceneFacts):
 
     @property
     def calm(self) -> bool:
-        """Return True if one body starts slowly, nothing loads it, and points keep neighbours.
+        """Return True if one body starts slowly, nothing loads it, and neighbours remain.
 
         A body that drifts meets a wall, and only artificial viscosity damps the front that follows.
-        In 2D and 3D, long paths may be those of vortices.
+        In 2D and 3D, long paths may belong to vortices.
         """
         held = not (self.burns or self.weighed or self.pressed)
         drifts = any(np.linalg.norm(m.velocity) > 0.1 * self.fastest for m in self.motions)

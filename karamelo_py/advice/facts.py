@@ -186,7 +186,7 @@ class SceneFacts(BasicFacts):
         """Return True if points of compressed gas will be more than `APART` cells apart.
 
         They are once the gas has expanded to the mean pressure of all gas. With APIC, a point alone
-        in its cells goes on expanding: a blast from a core of 3 cells lost 30 % of its energy.
+        in its cells continues to expand: a blast from a core of 3 cells lost 30 % of its energy.
         """
         points, kin = self.simulation.points, self.hub.domain.kin
         parts = [
